@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a picture shows: straight lines, the vanishing points they lead to, and the lane between two of them."""
+
+from robot_vision.perception.attitude import Attitude
+from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
+from robot_vision.perception.lane import LaneHeading
+from robot_vision.perception.line_detector import LineDetector
+from robot_vision.perception.segments import LineSegments
+from robot_vision.perception.vanishing import (
+    Role,
+    VanishingPointEstimator,
+    VanishingPoints,
+    VanishingPointTracker,
+)
+
+__all__ = [
+    "Attitude",
+    "HeadingEstimate",
+    "HeadingEstimator",
+    "LaneHeading",
+    "LineDetector",
+    "LineSegments",
+    "Role",
+    "VanishingPointEstimator",
+    "VanishingPointTracker",
+    "VanishingPoints",
+]

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the camera stands upright: the vertical direction from everything in the picture that tells of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry import attitude_from_up, up_from_attitude
+from robot_vision.geometry.sphere import local_coordinates, retract, tangent_basis
+from robot_vision.perception.vanishing import Role, VanishingPoints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """Lean of the camera body.
+
+    Attributes:
+        roll: left side up positive, rad.
+        pitch: nose down positive, rad.
+        covariance: (2, 2) of (roll, pitch), rad^2.
+        up: (3,) unit, the vertical in the optical frame.
+        up_covariance: (2, 2) rad^2 in the tangent plane of `up`.
+        seen: whether the picture told anything of it, or only the mounting.
+    """
+
+    roll: float
+    pitch: float
+    covariance: Array
+    up: Array
+    up_covariance: Array
+    seen: bool
+
+
+def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
+    """The vertical that agrees best with the vertical vanishing point, the horizontal ones and the mounting.
+
+    A vertical vanishing point names the vertical itself; each horizontal one says that the vertical lies at right
+    angles to it. One linear least-squares step in the tangent plane, repeated once.
+
+    Args:
+        points: with roles; `points.camera` tells how the camera is mounted.
+        lean: standard deviation of the body's lean about the mounting, rad.
+    """
+    mounted = points.camera.optical_to_base[2]
+    vertical = points.of(Role.VERTICAL)
+    level = np.isin(points.roles, [Role.PRIMARY, Role.HORIZONTAL])
+    directions, covariance = points.directions[level], points.covariance[level]
+    tangents = tangent_basis(directions)
+    prior = np.eye(2) / lean**2
+    up, information = mounted, prior
+    for _ in range(2):
+        basis = tangent_basis(up)
+        slopes = directions @ basis.T
+        along = tangents @ up
+        variance = np.einsum("mi,mij,mj->m", along, covariance, along)
+        weighted = slopes / np.maximum(variance, 1e-12)[:, None]
+        information = prior + weighted.T @ slopes
+        pull = prior @ local_coordinates(up, mounted) - weighted.T @ (directions @ up)
+        if vertical is not None:
+            # The covariance holds in the tangent plane of the point; carry it over to that of `up`.
+            carried = basis @ tangent_basis(points.directions[vertical]).T
+            own = np.linalg.inv(carried @ points.covariance[vertical] @ carried.T)
+            information = information + own
+            pull = pull + own @ local_coordinates(up, points.directions[vertical])
+        up = retract(up, np.asarray(np.linalg.solve(information, pull), dtype=np.float64))
+    up_covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    roll, pitch = attitude_from_up(up)
+    jacobian = _tangent_of_attitude(up, roll, pitch)
+    inverse = np.linalg.inv(jacobian)
+    telling = np.isin(points.roles, [Role.PRIMARY, Role.VERTICAL, Role.HORIZONTAL])
+    seen = bool(np.any(telling & (points.weight > 0.0)))
+    covariance = np.asarray(inverse @ up_covariance @ inverse.T, dtype=np.float64)
+    return Attitude(roll, pitch, covariance, up, up_covariance, seen)
+
+
+def _tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
+    """How `up` moves in its tangent plane with roll and pitch: (2, 2), by central differences."""
+    step = 1e-6
+    columns = [
+        (up_from_attitude(roll + step, pitch) - up_from_attitude(roll - step, pitch)) / (2.0 * step),
+        (up_from_attitude(roll, pitch + step) - up_from_attitude(roll, pitch - step)) / (2.0 * step),
+    ]
+    return np.asarray(tangent_basis(up) @ np.stack(columns, axis=1))
