@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From where the robot is in its lane to what the wheels shall do."""
+
+from robot_vision.control.corridor import CorridorSteering
+from robot_vision.control.limits import Steering
+
+__all__ = ["CorridorSteering", "Steering"]
