@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hears lines, says the vanishing points they lead to, and what these tell of the robot's way.
+
+Every `lines` message is answered on `vanishing_points`, if need be by an empty cloud; the other topics only
+when there is something to say.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import CameraInfo, Imu, PointCloud2
+from std_msgs.msg import Header
+
+from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
+from robot_vision.perception.odometry import TurnRateHistory
+from robot_vision.ros import calibration, messages, qos
+from robot_vision.ros.calibration import Calibration
+from robot_vision.ros.diagnostics import Level
+from robot_vision.ros.node import VisionNode, stamp_ns
+from robot_vision.ros.parameters import CAMERA_PLACE, Setting, camera_place
+from robot_vision.ros.run import run_node
+
+NO_WAY_ADVICE = "look whether the camera sees straight edges that lead ahead"
+
+
+class VpEstimatorNode(VisionNode):
+    """`lines`, `camera_info`, `odom` to `vanishing_points`, `heading`, `attitude`, `path_ahead`."""
+
+    SETTINGS = (
+        *CAMERA_PLACE,
+        Setting("lean", 0.035, "usual roll and pitch of the body about its mounting, rad", 0.001, 1.0),
+        Setting("lane.narrowest", 0.5, "least width a lane may have, m", 0.05, 100.0),
+        Setting("lane.widest", 12.0, "greatest width a lane may have, m", 0.05, 100.0),
+        Setting("path_length", 10.0, "length of path_ahead, m", 1.0, 100.0),
+    )
+
+    def __init__(self) -> None:
+        super().__init__("vp_estimator")
+        self._estimator = HeadingEstimator()
+        self._calibration = Calibration(camera_place(self.settings))
+        self._turn_rates = TurnRateHistory()
+        self._last_s: float | None = None
+        self._path_length = 0.0
+        self._vanishing_points = self.say(PointCloud2, "vanishing_points", qos.ANSWER)
+        self._heading = self.say(PoseWithCovarianceStamped, "heading", qos.ANSWER, awaited=True)
+        self._attitude = self.say(Imu, "attitude", qos.ANSWER)
+        self._path = self.say(Path, "path_ahead", qos.ANSWER)
+        self._camera_info = self.hear(CameraInfo, "camera_info", self._hear_camera_info, qos.SENSOR)
+        self._odom = self.hear(Odometry, "odom", self._hear_odom, qos.ODOMETRY)
+        self.hear(PointCloud2, "lines", self._hear_lines, qos.NEWEST, required=True, picture=True)
+        self.use_settings()
+
+    def configure(self, values: dict[str, Any]) -> None:
+        """Put the camera where it sits; what earlier pictures told stays."""
+        if values["lane.narrowest"] >= values["lane.widest"]:
+            raise ValueError("lane.narrowest must be less than lane.widest")
+        self._calibration.move(camera_place(values))
+        self._path_length = values["path_length"]
+        self._estimator.lean = values["lean"]
+        self._estimator.lane_filter.narrowest = values["lane.narrowest"]
+        self._estimator.lane_filter.widest = values["lane.widest"]
+
+    def warm_up(self) -> None:
+        """Load the compiled kernels."""
+        self._estimator.estimator.warm_up()
+
+    def on_clock_jump_back(self) -> None:
+        """Forget what earlier pictures and odometry told."""
+        self._estimator.reset()
+        self._turn_rates.clear()
+        self._last_s = None
+
+    def _hear_camera_info(self, message: CameraInfo) -> None:
+        self._calibration.take(message)
+
+    def _hear_odom(self, message: Odometry) -> None:
+        rate = message.twist.twist.angular.z
+        messages.check_finite({"twist.angular.z": rate})
+        self._turn_rates.add(1e-9 * stamp_ns(message.header.stamp), rate)
+
+    def _hear_lines(self, message: PointCloud2) -> None:
+        began = time.perf_counter()
+        self.follow_time("lines", message.header.stamp)
+        self.catch_up(self._camera_info)
+        self.catch_up(self._odom)
+        try:
+            lines = messages.lines_from_message(message)
+        except messages.MessageError as cause:
+            self.complain("lines", str(cause))
+            self._say_vanishing_points(message.header, None)
+            return
+        camera = self._calibration.camera
+        if camera is None:
+            missing = f"lines mean no direction without a calibration: {self._calibration.fault}"
+            self.complain("camera_info", missing, calibration.ADVICE)
+            self._say_vanishing_points(message.header, None)
+            return
+        now_s = 1e-9 * stamp_ns(message.header.stamp)
+        turn_rate = self._turn_rates.mean(now_s if self._last_s is None else self._last_s, now_s)
+        self._last_s = now_s
+        estimate = self._estimator.update(lines, camera, now_s, turn_rate)
+        self._say(message.header, estimate)
+        self.answered(message.header.stamp, began)
+
+    def _say(self, header: Header, estimate: HeadingEstimate) -> None:
+        lane = estimate.lane
+        if lane is not None:
+            self._heading.publish(messages.heading_to_message(header, lane))
+        self._say_vanishing_points(header, estimate)
+        if estimate.attitude is not None and estimate.attitude.seen:
+            self._attitude.publish(messages.attitude_to_message(header, estimate.attitude))
+        if lane is not None and lane.offset_known and self._path.get_subscription_count():
+            self._path.publish(messages.straight_path(header, lane, self._path_length))
+        if lane is None:
+            self.diagnostics.report(Level.WARN, estimate.reason, NO_WAY_ADVICE)
+        else:
+            self.diagnostics.report(Level.OK, estimate.reason or "knows heading and offset")
+
+    def _say_vanishing_points(self, header: Header, estimate: HeadingEstimate | None) -> None:
+        found = None if estimate is None else estimate.vanishing_points
+        self._vanishing_points.publish(messages.vanishing_points_to_message(header, found))
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(VpEstimatorNode, args)
+
+
+if __name__ == "__main__":
+    main()

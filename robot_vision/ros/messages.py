@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of the graph to and from the value types of the library; bytes go in and out without a loop."""
+
+from __future__ import annotations
+
+import array
+import math
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion, TwistStamped
+from nav_msgs.msg import Path
+from numpy.typing import ArrayLike, NDArray
+from sensor_msgs.msg import Imu, PointCloud2, PointField, Range
+from std_msgs.msg import Header
+
+from robot_vision.geometry.rotation import (
+    quaternion_from_rotation,
+    quaternion_to_rotation,
+    rotation_from_rpy,
+    rpy_from_rotation,
+)
+from robot_vision.perception import LineSegments, VanishingPoints
+from robot_vision.perception.attitude import Attitude
+from robot_vision.perception.lane import LaneHeading
+
+#: Variance of a part that is not known.
+UNKNOWN = 1e6
+#: A line without a `sigma` is placed this well, px.
+USUAL_SIGMA = 0.3
+
+LINES_LAYOUT = np.dtype([(name, "<f4") for name in ("x1", "y1", "x2", "y2", "strength", "sigma")])
+VANISHING_POINTS_LAYOUT = np.dtype(
+    [(name, "<f4") for name in ("x", "y", "z", "u", "v", "sigma", "weight")]
+    + [("id", "<u4"), ("role", "<u4")]
+)
+_DATATYPES = {"|i1": 1, "|u1": 2, "<i2": 3, "<u2": 4, "<i4": 5, "<u4": 6, "<f4": 7, "<f8": 8}
+_FORMATS = {number: kind for kind, number in _DATATYPES.items()}
+
+
+class MessageError(ValueError):
+    """A message does not hold what its topic promises; the text tells what and where."""
+
+
+def cloud_from_points(header: Header, points: NDArray[np.void]) -> PointCloud2:
+    """Build a PointCloud2 of one row from an (N,) structured array; its fields become the cloud's."""
+    layout = points.dtype
+    fields = [
+        PointField(name=name, offset=int(offset), datatype=_DATATYPES[kind.str], count=1)
+        for name, (kind, offset, *_) in (layout.fields or {}).items()
+    ]
+    return PointCloud2(
+        header=header,
+        height=1,
+        width=len(points),
+        fields=fields,
+        is_bigendian=False,
+        point_step=layout.itemsize,
+        row_step=layout.itemsize * len(points),
+        data=array.array("B", points.tobytes()),  # anything but an array or bytes costs tens of ms
+        is_dense=bool(all(np.isfinite(points[name]).all() for name in layout.names or ())),
+    )
+
+
+def points_from_cloud(cloud: PointCloud2, needed: Sequence[str]) -> NDArray[np.void]:
+    """Read a PointCloud2 as an (N,) structured array, by the names of its fields.
+
+    Args:
+        cloud: of any layout.
+        needed: names of fields without which it is of no use.
+
+    Raises:
+        MessageError: a field is missing or of an unknown type, or the cloud contradicts itself.
+    """
+    present = [field.name for field in cloud.fields]
+    missing = [name for name in needed if name not in present]
+    if missing:
+        has = ", ".join(present) or "none"
+        raise MessageError(f"the cloud lacks the fields {', '.join(missing)}; it has {has}")
+    order: Literal["big", "little"] = "big" if cloud.is_bigendian else "little"
+    formats = []
+    for field in cloud.fields:
+        if field.datatype not in _FORMATS or field.count != 1:
+            raise MessageError(
+                f"field {field.name} has the type {field.datatype} and count {field.count}; "
+                "one number of a type between 1 and 8 is understood"
+            )
+        formats.append(np.dtype(_FORMATS[field.datatype]).newbyteorder(order))
+    try:
+        layout = np.dtype(
+            {
+                "names": present,
+                "formats": formats,
+                "offsets": [field.offset for field in cloud.fields],
+                "itemsize": cloud.point_step,
+            }
+        )
+        return np.frombuffer(cloud.data, layout, cloud.width * cloud.height)
+    except ValueError as error:
+        raise MessageError(f"the cloud contradicts itself: {error}") from error
+
+
+def lines_to_message(header: Header, lines: LineSegments) -> PointCloud2:
+    """Build the `lines` message."""
+    points = np.empty(len(lines), LINES_LAYOUT)
+    for column, name in enumerate(("x1", "y1", "x2", "y2")):
+        points[name] = lines.endpoints[:, column]
+    points["strength"] = lines.strength
+    points["sigma"] = lines.sigma
+    return cloud_from_points(header, points)
+
+
+def lines_from_message(cloud: PointCloud2) -> LineSegments:
+    """Read the `lines` message, whose `sigma` may be absent.
+
+    Raises:
+        MessageError: fields are missing, or a number is not finite.
+    """
+    points = points_from_cloud(cloud, ("x1", "y1", "x2", "y2", "strength"))
+    names = points.dtype.names or ()
+    columns = {name: points[name].astype(np.float64) for name in LINES_LAYOUT.names or () if name in names}
+    if "sigma" not in columns:
+        columns["sigma"] = np.full(len(points), USUAL_SIGMA)
+    for name, values in columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise MessageError(f"{name} of line {bad[0]} is {values[bad[0]]} ({len(bad)} lines are so)")
+    ends = np.column_stack([columns[name] for name in ("x1", "y1", "x2", "y2")])
+    return LineSegments(ends, columns["strength"], columns["sigma"])
+
+
+def vanishing_points_to_message(header: Header, found: VanishingPoints | None) -> PointCloud2:
+    """Build the `vanishing_points` message; None gives an empty one."""
+    points = np.empty(0 if found is None else len(found), VANISHING_POINTS_LAYOUT)
+    if found is not None and len(found):
+        for column, name in enumerate(("x", "y", "z")):
+            points[name] = found.directions[:, column]
+        with np.errstate(over="ignore"):  # beyond float32 a pixel is at infinity
+            points["u"], points["v"] = found.pixels.T
+        points["sigma"] = found.sigma
+        points["weight"] = found.weight
+        points["id"] = found.ids
+        points["role"] = found.roles
+    return cloud_from_points(header, points)
+
+
+def heading_to_message(
+    header: Header, lane: LaneHeading, frame: str = "corridor"
+) -> PoseWithCovarianceStamped:
+    """Build the `heading` message, with the stamp of `header` in the frame of the lane."""
+    message = PoseWithCovarianceStamped(header=Header(stamp=header.stamp, frame_id=frame))
+    known = lane.offset_known
+    message.pose.pose.position.y = float(lane.offset) if known else 0.0
+    message.pose.pose.orientation = _quaternion(0.0, 0.0, lane.yaw)
+    covariance = np.zeros(36)
+    covariance[::7] = UNKNOWN
+    covariance[7] = min(lane.offset_variance, UNKNOWN)
+    covariance[35] = min(lane.yaw_variance, UNKNOWN)
+    message.pose.covariance = covariance
+    return message
+
+
+def heading_from_message(message: PoseWithCovarianceStamped) -> LaneHeading:
+    """Read the `heading` message; the width of the lane is not in it.
+
+    Raises:
+        MessageError: a number is not finite, the orientation is none, or a variance is negative.
+    """
+    pose, covariance = message.pose.pose, message.pose.covariance
+    q = pose.orientation
+    numbers = {
+        "position.y": pose.position.y,
+        **{f"orientation.{axis}": getattr(q, axis) for axis in "xyzw"},
+        "the variance of y": covariance[7],
+        "the variance of yaw": covariance[35],
+    }
+    check_finite(numbers)
+    for name in ("the variance of y", "the variance of yaw"):
+        if numbers[name] < 0.0:
+            raise MessageError(f"{name} is negative ({numbers[name]:g})")
+    try:
+        rotation = quaternion_to_rotation((q.x, q.y, q.z, q.w))
+    except ValueError as error:
+        raise MessageError(f"orientation names no direction: {error}") from error
+    yaw = rpy_from_rotation(rotation)[2]
+    if covariance[35] >= UNKNOWN:
+        raise MessageError("yaw is marked as unknown (variance 1e6), so there is nothing to steer by")
+    known = covariance[7] < UNKNOWN
+    return LaneHeading(
+        yaw,
+        float(covariance[35]),
+        float(pose.position.y) if known else 0.0,
+        float(covariance[7]) if known else math.inf,
+    )
+
+
+def attitude_to_message(header: Header, attitude: Attitude) -> Imu:
+    """Build the `attitude` message: roll and pitch of the camera's body; yaw is not known."""
+    message = Imu(header=header, orientation=_quaternion(attitude.roll, attitude.pitch, 0.0))
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = attitude.covariance
+    covariance[2, 2] = UNKNOWN
+    message.orientation_covariance = covariance.ravel()
+    message.angular_velocity_covariance[0] = -1.0
+    message.linear_acceleration_covariance[0] = -1.0
+    return message
+
+
+def straight_path(header: Header, lane: LaneHeading, length: float, step: float = 0.5) -> Path:
+    """Build `path_ahead`: the straight centre line of the lane, in base_link.
+
+    Args:
+        header: of the picture; its stamp is kept.
+        lane: with a known offset.
+        length: of the line, from the point nearest to the robot, m.
+        step: between its points, m.
+    """
+    way = np.arange(0.0, length + 0.5 * step, step)
+    sine, cosine = math.sin(lane.yaw), math.cos(lane.yaw)
+    # the lane lies at -yaw seen from the robot; its nearest point is `offset` to the right of it
+    x = way * cosine - lane.offset * sine
+    y = -way * sine - lane.offset * cosine
+    return path_to_message(header, np.column_stack([x, y]))
+
+
+def path_to_message(header: Header, points: ArrayLike) -> Path:
+    """Build a Path in base_link through (N, 2) points (m), each turned towards the next."""
+    xy = np.asarray(points, np.float64)
+    own = Header(stamp=header.stamp, frame_id="base_link")
+    along = np.diff(xy, axis=0, append=xy[-1:] + (xy[-1:] - xy[-2:-1]))
+    message = Path(header=own)
+    for (x, y), (dx, dy) in zip(xy.tolist(), along.tolist(), strict=True):
+        pose = Pose(orientation=_quaternion(0.0, 0.0, math.atan2(dy, dx)))
+        pose.position.x, pose.position.y = x, y
+        message.poses.append(PoseStamped(header=own, pose=pose))
+    return message
+
+
+def steering_to_message(header: Header, speed: float, turn_rate: float) -> TwistStamped:
+    """Build the `steering` message: m/s ahead and rad/s counter-clockwise, in base_link."""
+    message = TwistStamped(header=Header(stamp=header.stamp, frame_id="base_link"))
+    message.twist.linear.x = float(speed)
+    message.twist.angular.z = float(turn_rate)
+    return message
+
+
+def clearance_from_message(message: Range) -> float:
+    """Read the free way ahead in m; inf when there is nothing within the range of the sensor.
+
+    Raises:
+        MessageError: the range is no number or negative (-inf is nearer than can be measured: 0 m).
+    """
+    if message.range == -math.inf:
+        return 0.0
+    if math.isnan(message.range) or message.range < 0.0:
+        raise MessageError(f"range is {message.range}")
+    return float(message.range)
+
+
+def check_finite(numbers: Mapping[str, float]) -> None:
+    """Refuse numbers that are NaN or infinite, naming the first of them.
+
+    Raises:
+        MessageError: one is so.
+    """
+    for name, value in numbers.items():
+        if not math.isfinite(value):
+            raise MessageError(f"{name} is {value}")
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    x, y, z, w = quaternion_from_rotation(rotation_from_rpy(roll, pitch, yaw)).tolist()
+    return Quaternion(x=x, y=y, z=z, w=w)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Replays a bag in lockstep through the real nodes, each a process, and records what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from robot_vision.ros.processes import Graph, NodeProcess, ProcessError
+
+START_S = 180.0  # until everybody is ready: the first time kernels are compiled
+ANSWER_S = 5.0  # how long an answer to one picture is waited for
+LOOK_S = 0.2  # how often it is looked whether all processes live
+
+
+def replay(
+    bag: Path,
+    answers: Path,
+    nodes: Sequence[str],
+    lockstep: str,
+    settings: dict[str, dict[str, Any]],
+    duration_s: float = 0.0,
+    exclude: Sequence[str] = ("lines/overlay",),
+    answer_s: float = ANSWER_S,
+) -> None:
+    """Replay a bag and record what the nodes say.
+
+    Args:
+        bag: to replay.
+        answers: the bag to write; an old one is replaced.
+        nodes: executables.
+        lockstep: the topic that must answer each picture.
+        settings: parameters by node.
+        duration_s: how much of the bag, s; 0: all.
+        exclude: topics not to record.
+        answer_s: how long an answer to one picture is waited for, s.
+
+    Raises:
+        ProcessError: a process ended too early or with a failure; the text ends with its log.
+    """
+    player_settings: dict[str, Any] = {
+        "bag": bag,
+        "lockstep": lockstep,
+        "lockstep_timeout": answer_s,
+        "wait_for_nodes": list(nodes),
+        "wait_timeout": START_S,
+        "duration": float(duration_s),
+    }
+    recorder_settings = {"output": answers, "overwrite": True, "exclude": list(exclude)}
+    with Graph() as graph:
+        recorder = graph.start("bag_recorder", recorder_settings)
+        recorder.wait_for_line("recording")
+        started = [graph.start(node, {"use_sim_time": True, **settings.get(node, {})}) for node in nodes]
+        wait_for_end(graph.start("bag_player", player_settings), [recorder, *started])
+
+
+def wait_for_end(player: NodeProcess, others: Sequence[NodeProcess]) -> None:
+    """Wait until the replay is over.
+
+    Raises:
+        ProcessError: it failed, or one of the others ended before it.
+    """
+    while player.running:
+        with suppress(ProcessError):  # it still runs
+            player.wait(LOOK_S)
+        for node in others:
+            if not node.running:
+                raise ProcessError(_with_log(f"{node.node} ended before the replay", node))
+    if player.returncode:
+        raise ProcessError(_with_log(f"the replay failed with code {player.returncode}", player))
+
+
+def _with_log(text: str, process: NodeProcess) -> str:
+    return "\n".join([f"{text}; the log of {process.node} ends with:", *process.log[-20:]])

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The loop closed through the real nodes: camera to steering to camera, one seed of those `bench` drives."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from bench.closed_loop import drive  # noqa: E402  (the benchmarks are not installed)
+
+MAPPER = "robot_vision.nodes.plan_view_mapper"
+
+
+def test_the_graph_keeps_to_the_middle_of_a_corridor() -> None:
+    """From 0.4 m and 10 degrees off, 2 m wide, 1 m/s, body leaning by up to a degree."""
+    driven = drive(seed=4, rate=10)
+    assert driven["way_m"] >= 30.0
+    assert driven["contacts"] == 0, driven
+    assert driven["offset_rms_m"] <= 0.030
+    assert driven["without_steering"] == 0
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec(MAPPER) is None,
+    reason="nobody says `clearance` yet: plan_view_mapper is not there",
+)
+def test_the_graph_comes_to_rest_before_a_box_in_the_way() -> None:
+    driven = drive(seed=1, rate=10, world="corridor_blocked", settings=[""], seconds=25.0)
+    assert driven["contacts"] == 0, driven
+    assert driven["closest_m"] >= 0.3
