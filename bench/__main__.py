@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `python -m bench`: runs benchmarks, prints their tables, and writes out/bench.json."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+
+from bench.sources import ROOT, MissingSetError
+
+BENCHMARKS = {
+    "york": "vanishing points of single real pictures",
+    "kitti": "the way ahead on a real road, through the real nodes",
+    "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
+    "closed_loop": "30 m of corridor driven by the graph itself, ten times",
+    "lines": "cost of finding lines, beside OpenCV's LSD",
+    "latency": "from picture to steering at 30 Hz, processes over DDS",
+    "overload": "the same at 60 Hz: what is skipped, how old what is steered by",
+}
+OUTPUT = ROOT / "out" / "bench.json"
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run what the command line names, all when it names nothing."""
+    options = _parse(arguments)
+    names = list(dict.fromkeys(options.benchmarks)) or list(BENCHMARKS)
+    console = Console(highlight=False)
+    results: dict[str, Any] = {}
+    verdicts: list[bool] = []
+    skipped: list[str] = []
+    for name in names:
+        try:
+            with console.status(f"{name}: {BENCHMARKS[name]}"):
+                tables = import_module(f"bench.{name}").run(options.quick)
+        except MissingSetError as missing:
+            console.print(f"[yellow]{name} is skipped:[/] {escape(str(missing))}")
+            skipped.append(name)
+            results[name] = {"skipped": str(missing)}
+            continue
+        for table in tables:
+            table.print(console)
+            verdicts += table.verdicts
+        results[name] = [table.as_json() for table in tables]
+    _write(options.out, {"quick": options.quick, "machine": _machine(), "benchmarks": results})
+    left_out = f"; skipped: {', '.join(skipped)}" if skipped else ""
+    console.print(f"{sum(verdicts)} of {len(verdicts)} marks reached{left_out}; {options.out}")
+
+
+def _parse(arguments: list[str] | None) -> argparse.Namespace:
+    about = "\n".join(f"  {name:<10}{text}" for name, text in BENCHMARKS.items())
+    parser = argparse.ArgumentParser(
+        "python -m bench",
+        description="Measure accuracy and latency, beside the marks to reach.",
+        epilog=f"benchmarks:\n{about}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("benchmarks", nargs="*", help="which ones [all]")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer pictures, one run: a look, no measurement"
+    )
+    parser.add_argument("--out", type=Path, default=OUTPUT, help="the JSON file to write [out/bench.json]")
+    options = parser.parse_args(arguments)
+    for name in options.benchmarks:
+        if name not in BENCHMARKS:
+            parser.error(f"there is no benchmark {name!r}; choose from {', '.join(BENCHMARKS)}")
+    return options
+
+
+def _machine() -> dict[str, Any]:
+    return {"python": platform.python_version(), "system": platform.platform(), "cores": os.cpu_count()}
+
+
+def _write(path: Path, results: dict[str, Any]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole drives through the real nodes in lockstep, each node a process: good enough, and the same every time."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robot_vision.bags import BagReader, make_bag, score_heading
+from robot_vision.ros.replays import replay
+
+ROOT = Path(__file__).resolve().parents[1]
+CORRIDOR = ROOT / "bags" / "corridor.mcap"
+DATA = Path(os.environ.get("ROBOT_VISION_DATA", ROOT.parent / "shared" / "data"))
+PICTURES = ("lines/overlay", "image", "image/compressed")
+CHAIN = ("line_detector", "vp_estimator", "corridor_steering")
+
+
+def said(bag: Path, topic: str) -> list[bytes]:
+    return [message.cdr for message in BagReader(bag).messages([topic])]
+
+
+def test_the_corridor_is_steered_well_and_the_same_way_twice(tmp_path: Path) -> None:
+    settings = {
+        "line_detector": {"transport": "compressed"},
+        "vp_estimator": {"camera.height": 0.6, "camera.pitch": 0.0873},
+    }
+    first, again = tmp_path / "first.mcap", tmp_path / "again.mcap"
+    for answers in (first, again):
+        replay(CORRIDOR, answers, CHAIN, "steering", settings, exclude=PICTURES)
+    for topic in ("heading", "steering"):
+        assert len(said(first, topic)) == 225
+        assert said(first, topic) == said(again, topic)
+    score = score_heading(first)
+    assert score.missing == 0
+    assert score.yaw_rms_deg <= 0.3
+    assert score.offset.rms <= 0.05
+    assert 0.2 < score.yaw.normalised < 3.0
+    assert 0.1 < score.offset.normalised < 3.0
+
+
+def test_a_real_road_is_known_to_a_third_of_a_degree(tmp_path: Path) -> None:
+    source = DATA / "kitti_straight"
+    if not source.is_dir():
+        pytest.skip(
+            f"the pictures of kitti_straight are not at {source}; ROBOT_VISION_DATA names their place"
+        )
+    bag, answers = tmp_path / "road.mcap", tmp_path / "answers.mcap"
+    make_bag(
+        source / "image_l",
+        bag,
+        calibration=str(source / "calib.txt"),
+        poses=source / "poses.txt",
+        rate_hz=10.0,
+        transport="png",
+    )
+    nodes = CHAIN[:2]
+    replay(
+        bag,
+        answers,
+        nodes,
+        "vanishing_points",
+        {"line_detector": {"transport": "compressed"}},
+        exclude=PICTURES,
+    )
+    directions = [primary(cdr) for cdr in said(answers, "vanishing_points")]
+    assert len(directions) == 51
+    assert sum(direction is None for direction in directions) <= 1
+    azimuth = np.degrees([np.nan if d is None else np.arctan2(d[0], d[2]) for d in directions])
+    error = azimuth[:46] - travel(source / "poses.txt")
+    assert np.nanmedian(np.abs(error)) <= 0.3
+    assert np.nanmax(np.abs(error)) <= 2.0
+    assert np.nanstd(np.diff(azimuth)) <= 0.3
+
+
+def primary(cdr: bytes) -> np.ndarray | None:
+    from robot_vision.bags import decode
+    from robot_vision.bags.clouds import points
+
+    cloud = points(decode(cdr, "sensor_msgs/msg/PointCloud2"))
+    first = [place for place in range(len(cloud["role"])) if cloud["role"][place] == 1]
+    return np.array([cloud[axis][first[0]] for axis in "xyz"], float) if first else None
+
+
+def travel(poses: Path) -> np.ndarray:
+    """Azimuth of the way from picture i to picture i + 5 in the frame of camera i, degrees."""
+    matrices = np.loadtxt(poses).reshape(-1, 3, 4)
+    ways = [m[:, :3].T @ (n[:, 3] - m[:, 3]) for m, n in zip(matrices[:46], matrices[5:], strict=True)]
+    return np.degrees([np.arctan2(way[0], way[2]) for way in ways])
