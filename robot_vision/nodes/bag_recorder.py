@@ -80,7 +80,9 @@ class BagRecorder(VisionNode):
         self.get_logger().info(f"recording {', '.join(sorted(self._only)) or 'all topics'} into {output}")
 
     def stop(self) -> None:
-        """Finish the bag."""
+        """Finish the bag, with what has arrived but was not looked at yet."""
+        for heard in self._heard.values():
+            self.catch_up(heard.subscription)
         self._recording.close()
         if self._recording.trouble:
             self.get_logger().error(self._recording.trouble)
