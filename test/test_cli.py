@@ -87,6 +87,8 @@ def test_make_bag_makes_a_bag_that_can_be_read(tmp_path: Path) -> None:
         (("simulate", "--set", "colour=3", "-o", "x.mcap"), "'colour'"),
         (("demo", "--bag", "no/such.mcap"), "no/such.mcap"),
         (("demo", "--live", "moon"), "there is no world 'moon'"),
+        (("demo", "--height", "nan"), "the camera must be 0 m or more"),
+        (("demo", "--pitch", "120"), "-90 to 90 degrees, not 120"),
         (("simulate", "-o", "no/such/folder/x.png"), "no/such/folder/x.png"),
         (("play", "no/such.mcap"), "no/such.mcap"),
     ],
@@ -110,6 +112,14 @@ def test_the_demonstration_leaves_report_picture_film_and_bag(tmp_path: Path) ->
     film = cv2.VideoCapture(str(out / "demo.mp4"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == count
     assert film.read()[0]
+
+
+def test_the_answers_never_take_the_place_of_the_bag(tmp_path: Path) -> None:
+    bag = tmp_path / "demo.mcap"
+    simulation.record("corridor", bag, seconds=0.5)
+    before = bag.read_bytes()
+    assert "write the answers elsewhere" in refused("demo", "--bag", bag, "--out", tmp_path)
+    assert bag.read_bytes() == before
 
 
 def test_a_bag_without_pictures_is_no_demonstration(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from robot_vision.bags import BagError
 from robot_vision.ros.processes import Graph, NodeProcess, ProcessError
 
 START_S = 180.0  # until everybody is ready: the first time kernels are compiled
@@ -39,8 +40,11 @@ def replay(
         answer_s: how long an answer to one picture is waited for, s.
 
     Raises:
+        BagError: the answers would take the place of the bag.
         ProcessError: a process ended too early or with a failure; the text ends with its log.
     """
+    if answers.resolve() == bag.resolve():
+        raise BagError(f"{answers} is the bag to replay: write the answers elsewhere")
     player_settings: dict[str, Any] = {
         "bag": bag,
         "lockstep": lockstep,
