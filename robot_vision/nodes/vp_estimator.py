@@ -24,6 +24,8 @@ from robot_vision.ros.node import VisionNode, stamp_ns
 from robot_vision.ros.parameters import CAMERA_PLACE, Setting, camera_place
 from robot_vision.ros.run import run_node
 
+FASTEST_TURN = 20.0
+"""Turn rate beyond which odometry is not believed, rad/s: three turns a second."""
 NO_WAY_ADVICE = "look whether the camera sees straight edges that lead ahead"
 
 
@@ -80,6 +82,8 @@ class VpEstimatorNode(VisionNode):
     def _hear_odom(self, message: Odometry) -> None:
         rate = message.twist.twist.angular.z
         messages.check_finite({"twist.angular.z": rate})
+        if abs(rate) > FASTEST_TURN:
+            raise ValueError(f"twist.angular.z is {rate:g} rad/s: no robot turns so fast")
         self._turn_rates.add(1e-9 * stamp_ns(message.header.stamp), rate)
 
     def _hear_lines(self, message: PointCloud2) -> None:
@@ -102,7 +106,13 @@ class VpEstimatorNode(VisionNode):
         now_s = 1e-9 * stamp_ns(message.header.stamp)
         turn_rate = self._turn_rates.mean(now_s if self._last_s is None else self._last_s, now_s)
         self._last_s = now_s
-        estimate = self._estimator.update(lines, camera, now_s, turn_rate)
+        try:
+            estimate = self._estimator.update(lines, camera, now_s, turn_rate)
+        except Exception:
+            self._say_vanishing_points(
+                message.header, None
+            )  # whoever waits for this picture must not wait in vain
+            raise
         self._say(message.header, estimate)
         self.answered(message.header.stamp, began)
 

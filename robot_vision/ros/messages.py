@@ -24,13 +24,13 @@ from robot_vision.geometry.rotation import (
 from robot_vision.perception import LineSegments, VanishingPoints
 from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.lane import LaneHeading
+from robot_vision.perception.segments import USUAL_SIGMA
 
 #: Variance of a part that is not known.
 UNKNOWN = 1e6
-#: A line without a `sigma` is placed this well, px.
-USUAL_SIGMA = 0.3
-
-LINES_LAYOUT = np.dtype([(name, "<f4") for name in ("x1", "y1", "x2", "y2", "strength", "sigma")])
+LINES_LAYOUT = np.dtype([(name, "<f4") for name in ("x1", "y1", "x2", "y2", "strength")])
+#: The body of the camera: x ahead along the lens, y left, z up (REP-103), unlike the optical frame of its pictures.
+CAMERA_BODY = "camera_link"
 VANISHING_POINTS_LAYOUT = np.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "u", "v", "sigma", "weight")]
     + [("id", "<u4"), ("role", "<u4")]
@@ -107,27 +107,23 @@ def lines_to_message(header: Header, lines: LineSegments) -> PointCloud2:
     for column, name in enumerate(("x1", "y1", "x2", "y2")):
         points[name] = lines.endpoints[:, column]
     points["strength"] = lines.strength
-    points["sigma"] = lines.sigma
     return cloud_from_points(header, points)
 
 
 def lines_from_message(cloud: PointCloud2) -> LineSegments:
-    """Read the `lines` message, whose `sigma` may be absent.
+    """Read the `lines` message; how well each line is placed is not in it, so all are taken to be alike.
 
     Raises:
         MessageError: fields are missing, or a number is not finite.
     """
     points = points_from_cloud(cloud, ("x1", "y1", "x2", "y2", "strength"))
-    names = points.dtype.names or ()
-    columns = {name: points[name].astype(np.float64) for name in LINES_LAYOUT.names or () if name in names}
-    if "sigma" not in columns:
-        columns["sigma"] = np.full(len(points), USUAL_SIGMA)
+    columns = {name: points[name].astype(np.float64) for name in LINES_LAYOUT.names or ()}
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise MessageError(f"{name} of line {bad[0]} is {values[bad[0]]} ({len(bad)} lines are so)")
     ends = np.column_stack([columns[name] for name in ("x1", "y1", "x2", "y2")])
-    return LineSegments(ends, columns["strength"], columns["sigma"])
+    return LineSegments(ends, columns["strength"], np.full(len(points), USUAL_SIGMA))
 
 
 def vanishing_points_to_message(header: Header, found: VanishingPoints | None) -> PointCloud2:
@@ -165,15 +161,16 @@ def heading_from_message(message: PoseWithCovarianceStamped) -> LaneHeading:
     """Read the `heading` message; the width of the lane is not in it.
 
     Raises:
-        MessageError: a number is not finite, the orientation is none, or a variance is negative.
+        MessageError: a number is not finite, the orientation is none, or a variance is negative. A variance
+            without end is one: it says that nothing is known.
     """
     pose, covariance = message.pose.pose, message.pose.covariance
     q = pose.orientation
     numbers = {
         "position.y": pose.position.y,
         **{f"orientation.{axis}": getattr(q, axis) for axis in "xyzw"},
-        "the variance of y": covariance[7],
-        "the variance of yaw": covariance[35],
+        "the variance of y": min(covariance[7], UNKNOWN),
+        "the variance of yaw": min(covariance[35], UNKNOWN),
     }
     check_finite(numbers)
     for name in ("the variance of y", "the variance of yaw"):
@@ -197,7 +194,8 @@ def heading_from_message(message: PoseWithCovarianceStamped) -> LaneHeading:
 
 def attitude_to_message(header: Header, attitude: Attitude) -> Imu:
     """Build the `attitude` message: roll and pitch of the camera's body; yaw is not known."""
-    message = Imu(header=header, orientation=_quaternion(attitude.roll, attitude.pitch, 0.0))
+    own = Header(stamp=header.stamp, frame_id=CAMERA_BODY)
+    message = Imu(header=own, orientation=_quaternion(attitude.roll, attitude.pitch, 0.0))
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = attitude.covariance
     covariance[2, 2] = UNKNOWN

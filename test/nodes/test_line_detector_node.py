@@ -73,7 +73,7 @@ def test_without_calibration_it_finds_lines_and_says_what_is_missing(bench: Node
 def test_a_picture_without_lines_is_answered_by_an_empty_cloud(bench: NodeBench) -> None:
     cloud = show(bench, np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
     assert (cloud.width, len(cloud.data)) == (0, 0)
-    assert [field.name for field in cloud.fields] == ["x1", "y1", "x2", "y2", "strength", "sigma"]
+    assert [field.name for field in cloud.fields] == ["x1", "y1", "x2", "y2", "strength"]
 
 
 BAD_PICTURES = {
