@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,6 +84,8 @@ class EllipseDetector:
                 raise ValueError(f"{name} must lie between {low:g} and {high:g}, not {value}")
         self._contrast, self._blur = contrast, blur
         self._smallest, self._coverage, self._misfit = smallest, coverage, misfit
+        # White noise after a Gaussian is shared by the edge points along 2 √π of its standard deviation.
+        self._shared = max(1.0, 2.0 * math.sqrt(math.pi) * blur)
         self._light = np.rint(255.0 * (np.arange(256) / 255.0) ** gamma).astype(np.uint8)
 
     def detect(self, gray: NDArray[np.uint8]) -> list[SeenEllipse]:
@@ -130,7 +133,7 @@ class EllipseDetector:
         if coverage < self._coverage:
             return None
         is_dark = bool(dark[agreeing].all())
-        return SeenEllipse(fit.ellipse, fit.covariance, fit.sigma, coverage, is_dark)
+        return SeenEllipse(fit.ellipse, fit.covariance * self._shared, fit.sigma, coverage, is_dark)
 
 
 def _chains(points: Array, normals: Array) -> list[NDArray[np.intp]]:
