@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 #: rad: step of the derivative of a centre to the plane's normal.
 _NUDGE = 1e-6
+_BEYOND = "it lies beyond the vanishing line, where the plane of the others is not seen"
 
 
 class CentreError(ValueError):
@@ -61,11 +62,13 @@ class Centres:
         found: from top to bottom.
         line: (3,) vanishing line of their plane, px.
         plane: as the circles told it; None when it was given.
+        left_out: ellipses that cannot lie on it, each with the reason.
     """
 
     found: tuple[TrueCentre, ...]
     line: Array
     plane: CirclePlane | None
+    left_out: tuple[tuple[SeenEllipse, str], ...]
 
 
 class CentreFinder:
@@ -95,7 +98,7 @@ class CentreFinder:
 
         Raises:
             CentreError: nothing tells how the plane lies, or the picture has another size than the camera's.
-            ConicError: the circles do not tell it, or an ellipse touches the vanishing line that was given.
+            ConicError: the circles do not tell it, or no ellipse can lie on the plane that was given.
         """
         if camera is not None and gray.shape != (camera.height, camera.width):
             raise CentreError(
@@ -119,19 +122,34 @@ class CentreFinder:
 def _centres(
     seen: Sequence[SeenEllipse], line: Array, camera: Camera | None = None, plane: CirclePlane | None = None
 ) -> Centres:
-    found = []
+    found: list[TrueCentre] = []
+    left_out: list[tuple[SeenEllipse, str]] = []
+    side = _seen_side(seen, line)
     for number, each in enumerate(seen):
         try:
             centre = projected_centre(each.ellipse.conic, line)
         except ConicError as error:
-            place = f"({each.ellipse.u:.1f}, {each.ellipse.v:.1f})"
-            raise ConicError(f"the ellipse at {place}: {error.reason}") from error
+            left_out.append((each, error.reason))
+            continue
+        if side * (line @ np.append(centre, 1.0)) < 0.0:
+            left_out.append((each, _BEYOND))
+            continue
         covariance = each.covariance
         if camera is not None and plane is not None:
             covariance = covariance + _from_plane(each.ellipse, camera, plane)
         circle = None if plane is None else bool(plane.circles[number])
         found.append(TrueCentre(each, centre, covariance, circle))
-    return Centres(tuple(found), line, plane)
+    if left_out and not found:
+        each, reason = left_out[0]
+        raise ConicError(f"the ellipse at ({each.ellipse.u:.1f}, {each.ellipse.v:.1f}): {reason}")
+    return Centres(tuple(found), line, plane, tuple(left_out))
+
+
+def _seen_side(seen: Sequence[SeenEllipse], line: Array) -> float:
+    """The sign of the vanishing line's form where most of the ellipses lie: a plane is seen on one side only."""
+    return float(
+        sum(each.ellipse.minor * np.sign(line @ np.append(each.ellipse.centre, 1.0)) for each in seen)
+    )
 
 
 def _from_plane(ellipse: ImageEllipse, camera: Camera, plane: CirclePlane) -> Array:

@@ -81,6 +81,8 @@ def table(centres: Centres) -> Iterator[str]:
             f"{ellipse.u:12.3f} {ellipse.v:8.3f} {each.centre[0]:12.3f} {each.centre[1]:8.3f} {each.shift:8.3f} "
             f"{sigma:5.3f} {ellipse.major:5.1f} {ellipse.minor:4.1f}{kind}"
         )
+    for other, reason in centres.left_out:
+        yield f"left out: the ellipse at ({other.ellipse.u:.1f}, {other.ellipse.v:.1f}): {reason}"
 
 
 def write_drawing(path: Path, picture: Picture) -> None:

@@ -17,7 +17,7 @@ from robot_vision.perception.ellipse_fit import FittedEllipse, fit_ellipse
 
 Array = NDArray[np.float64]
 
-#: Parts into which an ellipse's border is cut to see how much of it shows.
+#: Parts into which an ellipse's border is cut to see how much of it shows, fewer where it has few points.
 _PARTS = 36
 #: Cosine of the angle to the border's normal beyond which a gradient is not that of the border.
 _ACROSS = 0.7
@@ -126,10 +126,9 @@ class EllipseDetector:
         if agreeing.mean() < _AGREEING:
             return None
         around = np.linalg.solve(fit.ellipse.frame, np.column_stack([points, np.ones(len(points))]).T)[:2]
-        part = (
-            np.floor((np.arctan2(around[1], around[0]) / (2.0 * np.pi) + 0.5) * _PARTS).astype(int) % _PARTS
-        )
-        coverage = len(np.unique(part[agreeing])) / _PARTS
+        parts = min(_PARTS, len(points) // 2)
+        turn = np.arctan2(around[1], around[0]) / (2.0 * np.pi) + 0.5
+        coverage = len(np.unique(np.floor(turn[agreeing] * parts) % parts)) / parts
         if coverage < self._coverage:
             return None
         is_dark = bool(dark[agreeing].all())

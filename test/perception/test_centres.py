@@ -104,15 +104,20 @@ def test_the_table_and_the_drawing_show_every_centre(views, tmp_path):
     assert np.array_equal(cv2.imread(str(tmp_path / "drawing.png")), drawing)
 
 
+def discs(*rows: int) -> np.ndarray:
+    picture = np.full((200, 120), 200, np.uint8)
+    for row in rows:
+        cv2.circle(picture, (60, row), 12, 20, -1, cv2.LINE_AA)
+    return picture
+
+
 def test_a_grey_picture_is_drawn_on_and_a_horizon_in_it_too():
-    disc = np.full((100, 120), 200, np.uint8)
-    cv2.circle(disc, (60, 70), 15, 20, -1, cv2.LINE_AA)
-    centres = CentreFinder().find(disc, line=(0.0, 1.0, -20.0))
+    centres = CentreFinder().find(discs(70), line=(0.0, 1.0, -20.0))
     (hole,) = centres.found
-    assert hole.seen.ellipse.minor == pytest.approx(15.5, abs=0.5)
+    assert hole.seen.ellipse.minor == pytest.approx(12.5, abs=0.5)
     assert hole.shift == pytest.approx(centre_shift(hole.seen.ellipse.minor, 50.0), rel=0.01)
-    drawing = draw_centres(disc, centres, scale=3)
-    assert drawing.shape == (300, 360, 3)
+    drawing = draw_centres(discs(70), centres, scale=3)
+    assert drawing.shape == (600, 360, 3)
     assert tuple(drawing[61, 300]) != (200, 200, 200)
 
 
@@ -124,11 +129,20 @@ def test_what_cannot_be_told_is_refused_with_its_reason(views):
         finder.find(view.gray, Camera(100.0, 100.0, 50.0, 50.0, 100, 100))
     with pytest.raises(ConicError, match="0 ellipses show no two circles"):
         finder.find(np.full((480, 640), 90, np.uint8), view.camera)
-    u, v = view.centres[3]
-    with pytest.raises(ConicError, match=r"the ellipse at \(.*touches or crosses the vanishing line"):
-        finder.find(view.gray, line=(0.0, 1.0, -v))
     with pytest.raises(ConicError, match="only a guess"):
         finder.find(view.gray, Camera.uncalibrated(640, 480))
+
+
+def test_ellipses_that_cannot_lie_on_the_plane_are_left_out_with_the_reason():
+    found = CentreFinder().find(discs(20, 60, 110, 160), line=(0.0, 1.0, -62.0))
+    assert places(found)[:, 1] == pytest.approx([110.0, 160.0], abs=4.0)
+    (above, beyond), (on_it, touches) = found.left_out
+    assert (above.ellipse.v, on_it.ellipse.v) == pytest.approx((20.0, 60.0), abs=0.1)
+    assert "beyond the vanishing line" in beyond
+    assert "touches or crosses the vanishing line" in touches
+    assert list(table(found))[-1].startswith("left out: the ellipse at (60.0, 60.0): it touches")
+    with pytest.raises(ConicError, match=r"the ellipse at \(60.*touches or crosses the vanishing line"):
+        CentreFinder().find(discs(60), line=(0.0, 1.0, -62.0))
 
 
 def test_a_picture_without_ellipses_has_no_centres():
