@@ -122,16 +122,20 @@ class CentreFinder:
 def _centres(
     seen: Sequence[SeenEllipse], line: Array, camera: Camera | None = None, plane: CirclePlane | None = None
 ) -> Centres:
-    found: list[TrueCentre] = []
     left_out: list[tuple[SeenEllipse, str]] = []
-    side = _seen_side(seen, line)
+    clear: list[tuple[int, Array]] = []
     for number, each in enumerate(seen):
         try:
-            centre = projected_centre(each.ellipse.conic, line)
+            clear.append((number, projected_centre(each.ellipse.conic, line)))
         except ConicError as error:
             left_out.append((each, error.reason))
-            continue
-        if side * (line @ np.append(centre, 1.0)) < 0.0:
+    # A plane is seen on one side of its vanishing line only: where most of the ellipses lie, by their size.
+    heights = [float(line @ np.append(centre, 1.0)) for _, centre in clear]
+    side = sum(seen[n].ellipse.minor * np.sign(h) for (n, _), h in zip(clear, heights, strict=True))
+    found: list[TrueCentre] = []
+    for (number, centre), height in zip(clear, heights, strict=True):
+        each = seen[number]
+        if side * height < 0.0:
             left_out.append((each, _BEYOND))
             continue
         covariance = each.covariance
@@ -142,14 +146,8 @@ def _centres(
     if left_out and not found:
         each, reason = left_out[0]
         raise ConicError(f"the ellipse at ({each.ellipse.u:.1f}, {each.ellipse.v:.1f}): {reason}")
+    left_out.sort(key=lambda other: (other[0].ellipse.v, other[0].ellipse.u))
     return Centres(tuple(found), line, plane, tuple(left_out))
-
-
-def _seen_side(seen: Sequence[SeenEllipse], line: Array) -> float:
-    """The sign of the vanishing line's form where most of the ellipses lie: a plane is seen on one side only."""
-    return float(
-        sum(each.ellipse.minor * np.sign(line @ np.append(each.ellipse.centre, 1.0)) for each in seen)
-    )
 
 
 def _from_plane(ellipse: ImageEllipse, camera: Camera, plane: CirclePlane) -> Array:
