@@ -8,12 +8,12 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from plates import PlateView, plate_view
 
 from robot_vision.geometry import Camera, ConicError, centre_shift, vanishing_line
 from robot_vision.perception import CentreError, CentreFinder, Centres, EllipseDetector
 from robot_vision.perception.centres_overlay import draw_centres
 from robot_vision.perception.centres_report import inspect, numbers_of, table, write_drawing
+from robot_vision.simulation.plate_view import PlateView, plate_view
 
 SEEDS = range(5)
 
