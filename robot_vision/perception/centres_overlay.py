@@ -40,7 +40,7 @@ def draw_centres(picture: Picture, centres: Centres, scale: int = 2, magnified: 
     """
     height, width = (scale * side for side in picture.shape[:2])
     colours = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture
-    canvas = cv2.resize(colours, (width, height), interpolation=cv2.INTER_CUBIC)
+    canvas = cv2.resize(colours, (width, height), interpolation=cv2.INTER_NEAREST)  # pixels stay pixels
     _draw_line(canvas, centres.line, scale)
     for each in centres.found:
         _draw(canvas, each, scale, magnified)

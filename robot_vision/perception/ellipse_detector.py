@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from robot_vision.geometry import ImageEllipse
-from robot_vision.perception.ellipse_fit import FittedEllipse, fit_ellipse
+from robot_vision.perception.ellipse_fit import fit_ellipse
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,10 @@ _PARTS = 36
 _ACROSS = 0.7
 #: px: edge points nearer than that are of one chain; crests leave gaps of a pixel where the steeper axis changes.
 _TOUCHING = 2.3
+#: px around an ellipse that are looked at again, and px from its border within which edge points are its own.
+_MARGIN, _NEAR = 8, 3.0
+#: Share of the median contrast of a border below which a point is not its own.
+_FAINT = 0.3
 #: Share of the points that must lie on the ellipse, and be bright on the same side.
 _AGREEING = 0.7
 
@@ -50,24 +54,25 @@ class EllipseDetector:
     """Finds ellipses whose border shows nearly whole against what surrounds them.
 
     Edge points are placed to a fraction of a pixel, those that touch each other are taken together, and an ellipse
-    is fitted to each such chain. What is no ellipse is left out by the fit.
+    is fitted to each such chain. What is no ellipse is left out by the fit. A lens blurs light, not grey levels, in
+    which the crest of the gradient lies some tenths of a pixel on the dark side of an edge: so the border of each
+    ellipse is looked at again in light, as bright as its surroundings allow, and fitted to that.
 
     Args:
-        contrast: least gradient of an edge point, levels of light a pixel, of 255.
+        contrast: least gradient of an edge point, grey levels a pixel.
         blur: standard deviation of the blur before the gradient, px.
         smallest: least semi-axis, px.
         coverage: least share of the border that shows.
         misfit: greatest standard deviation of the edge points about an ellipse, px.
-        gamma: of the picture's grey levels: light to the power of 1 / gamma. A lens blurs light, not grey levels,
-            and without this the crest of the gradient lies some tenths of a pixel on the dark side of an edge.
-            2.2 fits ordinary cameras; 1 is for those that give raw light.
+        gamma: of the picture's grey levels, which are light to the power of 1 / gamma: 2.2 fits ordinary cameras,
+            1 those that give raw light.
     """
 
     def __init__(
         self,
-        contrast: float = 4.0,
+        contrast: float = 6.0,
         blur: float = 1.0,
-        smallest: float = 4.0,
+        smallest: float = 3.0,
         coverage: float = 0.8,
         misfit: float = 0.3,
         gamma: float = 2.2,
@@ -86,7 +91,7 @@ class EllipseDetector:
         self._smallest, self._coverage, self._misfit = smallest, coverage, misfit
         # White noise after a Gaussian is shared by the edge points along 2 √π of its standard deviation.
         self._shared = max(1.0, 2.0 * math.sqrt(math.pi) * blur)
-        self._light = np.rint(255.0 * (np.arange(256) / 255.0) ** gamma).astype(np.uint8)
+        self._gamma = gamma
 
     def detect(self, gray: NDArray[np.uint8]) -> list[SeenEllipse]:
         """Find the ellipses of a grey picture (H, W) uint8, from top to bottom.
@@ -94,20 +99,31 @@ class EllipseDetector:
         Raises:
             ValueError: not a grey picture of 8 bits.
         """
-        # numba is slow to import, and pages of help need no edges
-        from robot_vision.perception.edges import NORMAL_U, NORMAL_V, EdgeFinder
-
         if gray.ndim != 2 or gray.dtype != np.uint8 or gray.size == 0:
             raise ValueError(f"gray must be uint8 (H, W), not {gray.dtype} {gray.shape}")
-        height, width = gray.shape
-        finder = EdgeFinder(height, width, self._blur)
-        finder.look(np.asarray(self._light[gray]))
-        _, found = finder.find(self._contrast)
-        points = found.astype(np.float64)
-        places, normals = points[:, :2], points[:, [NORMAL_U, NORMAL_V]]
-        chains = (self._ellipse(places[chain], normals[chain]) for chain in _chains(places, normals))
-        seen = [each for each in chains if each is not None]
-        return sorted(seen, key=lambda each: (each.ellipse.v, each.ellipse.u))
+        points, normals, _ = _edges(gray, self._blur, self._contrast)
+        coarse = (self._ellipse(points[chain], normals[chain]) for chain in _chains(points, normals))
+        fine = (self._in_light(gray, each) for each in coarse if each is not None)
+        return sorted(
+            (each for each in fine if each is not None), key=lambda each: (each.ellipse.v, each.ellipse.u)
+        )
+
+    def _in_light(self, gray: NDArray[np.uint8], coarse: SeenEllipse) -> SeenEllipse | None:
+        """The same ellipse by the crests of the gradient of light along its border."""
+        border = coarse.ellipse.points(72)
+        left, top = np.maximum(np.floor(border.min(axis=0)).astype(int) - _MARGIN, 0)
+        right, bottom = np.ceil(border.max(axis=0)).astype(int) + _MARGIN + 1
+        window = gray[top:bottom, left:right]
+        light = np.rint(255.0 * (window / window.max()) ** self._gamma).astype(np.uint8)
+        points, normals, contrast = _edges(light, self._blur, 1.0)
+        points = points + (left, top)
+        distances, outward = _beside(coarse.ellipse, points)
+        towards = np.einsum("ni,ni->n", normals, outward) * (1.0 if coarse.dark else -1.0)
+        there = (np.abs(distances) < _NEAR) & (towards > _ACROSS)
+        if not there.any():
+            return None
+        there &= contrast > _FAINT * np.median(contrast[there])
+        return self._ellipse(points[there], normals[there])
 
     def _ellipse(self, points: Array, normals: Array) -> SeenEllipse | None:
         """The ellipse that a chain of edge points (N, 2) with gradients (N, 2) is, or None."""
@@ -117,11 +133,9 @@ class EllipseDetector:
         fit = fit_ellipse(points)
         if fit is None or fit.ellipse.minor < self._smallest or fit.sigma > self._misfit:
             return None
-        border = _border(fit, points)
         on_it = fit.weights > 0.0
-        outward = np.einsum("ni,ni->n", normals, border)
-        dark = outward > _ACROSS
-        bright = outward < -_ACROSS
+        outward = np.einsum("ni,ni->n", normals, _beside(fit.ellipse, points)[1])
+        dark, bright = outward > _ACROSS, outward < -_ACROSS
         agreeing = on_it & (dark if (dark & on_it).sum() >= (bright & on_it).sum() else bright)
         if agreeing.mean() < _AGREEING:
             return None
@@ -133,6 +147,18 @@ class EllipseDetector:
             return None
         is_dark = bool(dark[agreeing].all())
         return SeenEllipse(fit.ellipse, fit.covariance * self._shared, fit.sigma, coverage, is_dark)
+
+
+def _edges(picture: NDArray[np.uint8], blur: float, contrast: float) -> tuple[Array, Array, Array]:
+    """Places (N, 2), unit gradients (N, 2) and contrasts (N,) of the edge points of a picture (H, W)."""
+    # numba is slow to import, and pages of help need no edges
+    from robot_vision.perception.edges import CONTRAST, NORMAL_U, NORMAL_V, EdgeFinder
+
+    height, width = picture.shape
+    finder = EdgeFinder(height, width, blur)
+    finder.look(picture)
+    found = finder.find(contrast)[1].astype(np.float64)
+    return found[:, :2], found[:, [NORMAL_U, NORMAL_V]], found[:, CONTRAST]
 
 
 def _chains(points: Array, normals: Array) -> list[NDArray[np.intp]]:
@@ -149,8 +175,11 @@ def _chains(points: Array, normals: Array) -> list[NDArray[np.intp]]:
     return np.split(order, np.searchsorted(chain[order], np.arange(1, count)))
 
 
-def _border(fit: FittedEllipse, points: Array) -> Array:
-    """Outward unit normals (N, 2) of the ellipse beside points (N, 2)."""
-    conic = fit.ellipse.conic
-    slope = np.column_stack([points, np.ones(len(points))]) @ conic[:, :2]
-    return np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
+def _beside(ellipse: ImageEllipse, points: Array) -> tuple[Array, Array]:
+    """Distances (N,) of points (N, 2) from an ellipse, to first order, and its outward unit normals (N, 2) there."""
+    inverse = np.linalg.inv(ellipse.frame[:2, :2])
+    circle = (points - ellipse.centre) @ inverse.T
+    radius = np.maximum(np.linalg.norm(circle, axis=1), 1e-12)
+    slope = (circle / radius[:, None]) @ inverse
+    steepness = np.linalg.norm(slope, axis=1)
+    return (radius - 1.0) / steepness, slope / steepness[:, None]

@@ -96,7 +96,7 @@ def test_the_table_and_the_drawing_show_every_centre(views, tmp_path):
         [each.shift for each in centres.found], abs=1e-3
     )
     assert drawing.shape == (960, 1280, 3)
-    plain = cv2.resize(view.picture, (1280, 960), interpolation=cv2.INTER_CUBIC)
+    plain = cv2.resize(view.picture, (1280, 960), interpolation=cv2.INTER_NEAREST)
     for each in centres.found:  # the cross of the true centre is there
         u, v = np.rint(2.0 * each.centre + 0.5).astype(int)
         assert (drawing[v - 3 : v + 4, u - 3 : u + 4] != plain[v - 3 : v + 4, u - 3 : u + 4]).any()
