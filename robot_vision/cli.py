@@ -207,8 +207,12 @@ def centres(
     line: Annotated[
         Optional[str], typer.Option(help="Vanishing line of the plate: a,b,c of a u + b v + c = 0, px.")
     ] = None,
-    contrast: Annotated[float, typer.Option(help="Least gradient, grey levels a pixel.")] = 6.0,
-    gamma: Annotated[float, typer.Option(help="Of the grey levels; 1 for raw light.")] = 2.2,
+    contrast: Annotated[
+        float, typer.Option(min=0.5, max=255.0, help="Least gradient, grey levels a pixel.")
+    ] = 6.0,
+    gamma: Annotated[
+        float, typer.Option(min=0.2, max=5.0, help="Of the grey levels; 1 for raw light.")
+    ] = 2.2,
 ) -> None:
     """Find the true centres of circles and ellipses on a plate, which perspective shifts from those seen."""
     from robot_vision.bags.calibration import read_calibration

@@ -22,6 +22,12 @@ from robot_vision.geometry.sphere import cross, normalised, retract, tangent_bas
 _STEPS = 10
 #: rad: step of the derivative of a circle's shape to the plane's normal.
 _NUDGE = 1e-6
+#: rad: longest step of the search for the normal.
+_STRIDE = 0.1
+#: rad between two normals that are one.
+_SAME = 0.02
+#: A plane is the right one when the other fits so many times worse.
+_CLEARLY = 3.0
 #: A share of the longer semi-axis by which a circle's picture, moved to the plane, may miss a circle.
 ROUND = 0.02
 
@@ -72,15 +78,15 @@ def plane_of_circles(
 
     Raises:
         ConicError: a focal length that is only a guess, or fewer than two circles that agree on a plane: one
-            circle alone fits two planes.
+            circle alone fits two planes, as many do from afar.
     """
     if not camera.focal_known:
         raise ConicError("the focal length of the camera is only a guess, so the plane cannot be told")
     cones = _cones(ellipses, camera)
-    candidates = [normal for each in ellipses for normal in circle_normals(each, camera)]
+    pairs = np.array([circle_normals(each, camera) for each in ellipses]).reshape(-1, 2, 3)
     best, agreeing = np.zeros(3), np.zeros(len(ellipses), dtype=bool)
     missed = np.inf
-    for normal in candidates:
+    for normal in pairs.reshape(-1, 3):
         apart = np.hypot(*_out_of_round(cones, tangent_basis(normal)).T)
         near = apart < tolerance
         # Most circles win; among as many, the roundest.
@@ -91,18 +97,34 @@ def plane_of_circles(
             f"{len(ellipses)} ellipses show no two circles on one plane, and one alone fits two planes: give "
             "the plane's normal or its vanishing line"
         )
-    normal = best
+    normal, spread, misfit = _fitted(cones[agreeing], best)
+    # The other plane of each circle: from afar, where perspective is weak, these agree among themselves, too.
+    pairs = pairs[agreeing]
+    others = np.where((pairs[:, :1] @ normal < pairs[:, 1:] @ normal)[..., None], pairs[:, :1], pairs[:, 1:])
+    mirrored, _, rival = _fitted(cones[agreeing], normalised(others[:, 0].sum(axis=0)))
+    if float(np.linalg.norm(mirrored - normal)) > _SAME and rival < _CLEARLY**2 * misfit:
+        raise ConicError(
+            f"the {agreeing.sum()} circles fit two planes about as well, because perspective is too weak to tell "
+            "which end is farther: give the plane's normal or its vanishing line"
+        )
+    freedom = 2 * int(agreeing.sum()) - 2
+    return CirclePlane(normal, spread * misfit / freedom, agreeing)
+
+
+def _fitted(cones: FloatArray, normal: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """The normal (3,) nearest by on which the cones are roundest, its spread (2, 2), and the misfit left."""
+    spread = np.eye(2)
     for _ in range(_STEPS):
-        residual = _out_of_round(cones[agreeing], tangent_basis(normal)).ravel()
-        slope = _slopes(cones[agreeing], normal)
-        spread = np.asarray(np.linalg.inv(slope.T @ slope), dtype=np.float64)
+        residual = _out_of_round(cones, tangent_basis(normal)).ravel()
+        slope = _slopes(cones, normal)
+        spread = np.asarray(np.linalg.pinv(slope.T @ slope), dtype=np.float64)
         step = np.asarray(-spread @ (slope.T @ residual), dtype=np.float64)
+        step = step * min(1.0, _STRIDE / max(float(np.hypot(step[0], step[1])), 1e-300))
         normal = retract(normal, step)
         if float(np.abs(step).max()) < 1e-13:
             break
-    residual = _out_of_round(cones[agreeing], tangent_basis(normal)).ravel()
-    freedom = max(len(residual) - 2, 1)
-    return CirclePlane(normal, np.asarray(spread * float(residual @ residual) / freedom), agreeing)
+    residual = _out_of_round(cones, tangent_basis(normal)).ravel()
+    return normal, spread, float(residual @ residual)
 
 
 def _cones(ellipses: Sequence[ImageEllipse], camera: Camera) -> FloatArray:

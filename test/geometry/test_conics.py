@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -259,3 +259,15 @@ def test_one_circle_alone_tells_no_plane():
         plane_of_circles([], CAMERA)
     with pytest.raises(ConicError, match="only a guess"):
         plane_of_circles([one, one], Camera.uncalibrated(640, 480))
+
+
+def test_circles_seen_from_too_far_away_to_tell_which_end_is_farther_are_refused():
+    tele = Camera(20000.0, 20000.0, 320.0, 240.0, 640, 480)
+    normal = -np.array([0.5, 0.2, 1.0]) / np.linalg.norm([0.5, 0.2, 1.0])
+    rays = [np.array([x, y, 1.0]) for x, y in ((-0.001, -0.0005), (0.001, 0.0), (0.0, 0.0008))]
+    seen = [ImageEllipse.from_conic(hole(tele, normal, ray, 0.002).conic) for ray in rays]
+    # Edges are placed to some hundredths of a pixel.
+    shaky = [replace(each, major=each.major + by) for each, by in zip(seen, (0.03, -0.03, 0.02), strict=True)]
+    with pytest.raises(ConicError, match="fit two planes about as well.*give the plane's normal"):
+        plane_of_circles(shaky, tele)
+    assert angle_between(plane_of_circles(seen, tele).normal, normal) < 1e-3
