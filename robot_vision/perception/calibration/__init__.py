@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration: what the pictures of a drive tell of the camera that took them."""
+
+from robot_vision.perception.calibration.calibrator import CameraCalibrator
+from robot_vision.perception.calibration.findings import (
+    CalibrationError,
+    CameraCalibration,
+    Finding,
+    KnownLengths,
+)
+
+__all__ = ["CalibrationError", "CameraCalibration", "CameraCalibrator", "Finding", "KnownLengths"]

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the lines of a drive to the camera that took it: focal length, roll, pitch and height."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry import Camera
+from robot_vision.perception.calibration.findings import (
+    CalibrationError,
+    CameraCalibration,
+    Finding,
+    KnownLengths,
+)
+from robot_vision.perception.calibration.focal import SharedFocalLength, share_focal_length
+from robot_vision.perception.calibration.height import height_from_corridor
+from robot_vision.perception.calibration.mounting import Mounting, find_mounting
+from robot_vision.perception.segments import LineSegments
+from robot_vision.perception.vanishing import VanishingPointEstimator
+from robot_vision.perception.vanishing.bundle import Bundle
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+#: The mounting is searched again from where it was found when it lies farther from the guess than this, rad.
+_FAR_FROM_GUESS = np.deg2rad(3.0)
+
+
+@dataclass(frozen=True)
+class CameraCalibrator:
+    """Calibrates a camera from what is straight, upright and at right angles in front of it.
+
+    1. The focal length on which the right angles of most pictures agree.
+    2. With it (or with the one given, when the pictures do not tell) the vertical in every picture, and the
+       mounting as their robust mean.
+    3. With both, the height at which a known length on the ground has that length.
+
+    What the pictures do not tell is said so, with the reason, and stays as it was given. The principal point and the
+    lens are taken as given.
+
+    Args:
+        estimator: of the vanishing points of one picture.
+        squareness: how far right angles and verticals of what was built are off, the same way in all pictures
+            (standard deviation), rad.
+        lean: how far the body leans about its mounting (standard deviation), rad.
+        most_doubt: relative standard deviation of the focal length beyond which it is not told.
+        most_lean_doubt: standard deviation of roll or pitch beyond which it is not told, rad.
+        least_agreement: share of the pictures that must agree, each counted by how sure it is.
+        least_share: share of the pictures that must say something of the focal length.
+        least_level_share: share of the pictures that must say something of roll or pitch.
+    """
+
+    estimator: VanishingPointEstimator = field(default_factory=VanishingPointEstimator)
+    squareness: float = float(np.deg2rad(0.1))
+    lean: float = float(np.deg2rad(1.0))
+    most_doubt: float = 0.05
+    most_lean_doubt: float = float(np.deg2rad(1.0))
+    least_agreement: float = 0.7
+    least_share: float = 0.15
+    least_level_share: float = 0.5
+
+    def calibrate(
+        self,
+        pictures: Sequence[LineSegments],
+        camera: Camera,
+        stamps_s: Sequence[float] | None = None,
+        lengths: KnownLengths | None = None,
+        progress: Progress = lambda done, total: None,
+    ) -> CameraCalibration:
+        """Find what the pictures tell of their camera.
+
+        Args:
+            pictures: lines of N pictures of one camera, rectified px.
+            camera: as far as it is known, `Camera.uncalibrated` when it is not at all. Its focal length is used
+                only when the pictures do not tell; its roll and pitch say where the search begins.
+            stamps_s: (N,) times of the pictures, s; needed for a corridor's width; 0.1 s apart when not given.
+            lengths: known lengths on the ground.
+            progress: called with steps done and in all.
+
+        Raises:
+            CalibrationError: when there are no pictures, or not as many stamps.
+        """
+        if not pictures:
+            raise CalibrationError("there is no picture to calibrate from")
+        stamps = [0.1 * k for k in range(len(pictures))] if stamps_s is None else list(stamps_s)
+        if len(stamps) != len(pictures):
+            raise CalibrationError(f"there are {len(stamps)} stamps for {len(pictures)} pictures")
+        camera = camera.rectified()
+        count = len(pictures)
+        focal = self._focal(pictures, camera, lambda done: progress(done, 2 * count))
+        known = camera
+        if focal.value is not None:
+            stretch = focal.value / camera.fx
+            known = replace(camera, fx=focal.value, fy=camera.fy * stretch, focal_known=True, projection=None)
+        if not known.focal_known:
+            waits = Finding.missing("without a focal length no angle is known", count)
+            return CameraCalibration(camera, camera, count, focal, waits, waits, waits)
+        found = self._mounting(pictures, known)
+        progress(3 * count // 2, 2 * count)
+        doubt = focal.sigma / focal.value if focal.value is not None else 0.0
+        roll, pitch = self._roll(found, count), self._pitch(found, doubt, count)
+        known = replace(
+            known,
+            roll=camera.roll if roll.value is None else roll.value,
+            pitch=camera.pitch if pitch.value is None else pitch.value,
+        )
+        height = self._height(pictures, stamps, known, pitch, lengths or KnownLengths())
+        progress(2 * count, 2 * count)
+        if height.value is not None:
+            known = replace(known, height_m=height.value)
+        return CameraCalibration(known, camera, count, focal, roll, pitch, height)
+
+    def _focal(
+        self, pictures: Sequence[LineSegments], camera: Camera, progress: Callable[[int], None]
+    ) -> Finding:
+        # Begin with the longer side of the picture, whatever was given: that is for comparison alone.
+        longer = float(max(camera.width, camera.height))
+        guess = replace(
+            camera, fx=longer, fy=longer * camera.fy / camera.fx, projection=None, focal_known=False
+        )
+        bundles = [Bundle.of(lines, guess, self.estimator.most_lines) for lines in pictures]
+        shared = share_focal_length(bundles, self.squareness, progress)
+        fault = self._focal_fault(shared, len(pictures))
+        own = longer * shared.own
+        if fault:
+            return Finding(None, float("inf"), shared.telling, fault, own)
+        value = longer * shared.ratio
+        reason = f"from right angles on which {100 * shared.agreement:.0f} % of them agree"
+        return Finding(value, value * shared.sigma, shared.telling, reason, own)
+
+    def _focal_fault(self, shared: SharedFocalLength, count: int) -> str:
+        """Why the focal length is not told, empty when it is."""
+        if shared.telling < max(1.0, self.least_share * count):
+            seen = "none" if not shared.telling else f"only {shared.telling}"
+            return (
+                f"{seen} of {count} pictures show two directions at right angles, both of them oblique; "
+                "one vanishing point alone, or one looked at squarely, says nothing of the focal length"
+            )
+        if shared.agreement < self.least_agreement:
+            return (
+                f"the pictures contradict each other: {100 * shared.agreement:.0f} % agree on a focal length, "
+                "so what they show is not built at right angles"
+            )
+        if not shared.sigma < self.most_doubt:
+            return f"the pictures leave it open by {100 * shared.sigma:.0f} %"
+        return ""
+
+    def _mounting(self, pictures: Sequence[LineSegments], camera: Camera) -> Mounting:
+        for _ in range(3):
+            points = [self.estimator.estimate(lines, camera) for lines in pictures]
+            found = find_mounting(points, camera.optical_to_base[2], self.lean)
+            moved = max(abs(found.roll - camera.roll), abs(found.pitch - camera.pitch))
+            camera = replace(camera, roll=found.roll, pitch=found.pitch)
+            if moved < _FAR_FROM_GUESS:
+                break
+        return found
+
+    def _roll(self, found: Mounting, count: int) -> Finding:
+        sigma = float(np.hypot(np.sqrt(found.covariance[0, 0]), self.squareness))
+        return self._angle("roll", found.roll, sigma, found, 0, count)
+
+    def _pitch(self, found: Mounting, focal_doubt: float, count: int) -> Finding:
+        # A focal length longer by a share e moves a direction at angle p off the axis by e sin(2 p) / 2.
+        sigma = float(np.sqrt(found.covariance[1, 1]))
+        sigma = float(
+            np.hypot(np.hypot(sigma, self.squareness), 0.5 * np.sin(2.0 * found.pitch) * focal_doubt)
+        )
+        return self._angle("pitch", found.pitch, sigma, found, 1, count)
+
+    def _angle(
+        self, name: str, value: float, sigma: float, found: Mounting, axis: int, count: int
+    ) -> Finding:
+        told = found.telling[axis]
+        own = found.own[:, axis]
+        fault = ""
+        if told < self.least_level_share * count:
+            needed = "upright lines" if name == "roll" else "upright lines or a level vanishing point ahead"
+            fault = f"only {told} of {count} pictures tell of the {name}: it wants {needed}"
+        elif found.agreement < self.least_agreement:
+            fault = (
+                f"the pictures contradict each other: {100 * found.agreement:.0f} % agree on where upright is"
+            )
+        elif not sigma < self.most_lean_doubt:
+            fault = (
+                f"the pictures leave it open by {np.degrees(min(sigma, np.pi)):.1f}°: it wants upright lines"
+            )
+        if fault:
+            return Finding(None, float("inf"), told, fault, own)
+        return Finding(value, sigma, told, "the mean over the pictures, about which the body leans", own)
+
+    def _height(
+        self,
+        pictures: Sequence[LineSegments],
+        stamps_s: Sequence[float],
+        camera: Camera,
+        pitch: Finding,
+        lengths: KnownLengths,
+    ) -> Finding:
+        if lengths.corridor_width is None:
+            return Finding.missing(
+                "no length on the ground was given: a picture alone has no scale", len(pictures)
+            )
+        if not pitch.known:
+            return Finding.missing("without the pitch no distance on the ground is known", len(pictures))
+        return height_from_corridor(pictures, stamps_s, camera, lengths.corridor_width)
