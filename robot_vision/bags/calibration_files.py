@@ -52,15 +52,14 @@ def write_parameters_yaml(
 
     Args:
         path: of the file; an old one is replaced.
-        parameters: value by name.
+        parameters: value by name, at least one.
         remarks: lines of comment that open the file.
 
     Raises:
         BagError: the file cannot be written.
     """
     values = {name: float(value) for name, value in parameters.items()}
-    # Without any value there is nothing a node could read, but the comments say why.
-    _write(path, {"/**": {"ros__parameters": values}} if values else {}, remarks)
+    _write(path, {"/**": {"ros__parameters": values}}, remarks)
 
 
 def _matrix(values: Sequence[float], rows: int) -> dict[str, Any]:
@@ -79,7 +78,6 @@ def _write(path: str | os.PathLike[str], content: dict[str, Any], remarks: Seque
     try:
         with Path(path).open("w", encoding="utf-8") as stream:
             stream.writelines(f"# {remark}\n" for remark in remarks)
-            if content:
-                yaml.dump(content, stream)
+            yaml.dump(content, stream)
     except OSError as error:
         raise BagError(f"cannot write {path}: {error.strerror}") from error

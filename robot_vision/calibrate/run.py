@@ -91,6 +91,7 @@ def _write_camera(path: Path, drive: Drive, found: CameraCalibration, console: C
             camera = drive.camera
             origin = "the focal length given, which goes with its lens; see how it compares"
     if camera is None or not camera.focal_known:
+        path.unlink(missing_ok=True)  # one of an earlier drive would be taken for the answer
         console.print(f"{path} is not written: the focal length is not known", markup=False)
         return
     write_camera_yaml(path, camera, remarks=remarks_of(found, str(drive.bag)))
@@ -100,6 +101,9 @@ def _write_camera(path: Path, drive: Drive, found: CameraCalibration, console: C
 def _write_parameters(path: Path, drive: Drive, found: CameraCalibration, console: Console) -> None:
     findings = {"camera.height": found.height, "camera.pitch": found.pitch, "camera.roll": found.roll}
     values = {name: finding.value for name, finding in findings.items() if finding.value is not None}
+    if not values:
+        path.unlink(missing_ok=True)
+        console.print(f"{path} is not written: neither height nor lean is known", markup=False)
+        return
     write_parameters_yaml(path, values, remarks_of(found, str(drive.bag)))
-    names = ", ".join(values) or "none of the parameters could be told"
-    console.print(f"{path}: {names}, for --ros-args --params-file", markup=False)
+    console.print(f"{path}: {', '.join(values)}, for --ros-args --params-file", markup=False)
