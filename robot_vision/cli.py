@@ -205,6 +205,12 @@ def calibrate(
     corridor_width: Annotated[
         Optional[float], typer.Option(help="Between the feet of the two walls, m; gives the height.")
     ] = None,
+    stone_width: Annotated[
+        Optional[float], typer.Option(help="Of flagstones across the way, joint to joint, m; likewise.")
+    ] = None,
+    stone_length: Annotated[
+        Optional[float], typer.Option(help="Of flagstones along the way, joint to joint, m; likewise.")
+    ] = None,
     pitch: Annotated[
         float, typer.Option(help="Roughly, degrees; where a camera looks down by more than 30.")
     ] = 0.0,
@@ -218,7 +224,7 @@ def calibrate(
     from robot_vision.calibrate import Asked, run_calibration
     from robot_vision.perception.calibration import KnownLengths
 
-    lengths = KnownLengths(corridor_width=corridor_width)
+    lengths = KnownLengths(corridor_width, stone_width, stone_length)
     asked = Asked(bag, out, calibration, lengths, math.radians(pitch), most)
     if not run_calibration(asked, Console(highlight=False, soft_wrap=True), _progress):
         raise typer.Exit(1)

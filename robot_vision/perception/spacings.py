@@ -16,11 +16,11 @@ _STEPS_A_DOUBLING = 40
 _SHARPNESS = 8.0
 #: Farther off its place than this share of a period, a mark is not one of the row: before and after the fit.
 _FAR_OFF, _OFF = 0.2, 0.02
-_ROUNDS = 12
+_ROUNDS = 8
 #: Rows one accepts among marks that lie at random, in the mean.
-_CERTAINTY = 0.01
+_CERTAINTY = 0.03
 #: Of periods about as good the longest is meant: a row of period s is also one of s / 2.
-_ABOUT = 0.9
+_ABOUT = 0.8
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class RegularMarks:
         sigma: standard deviation of the period.
         chosen: (K,) indices of the marks that belong to the row.
         number: (K,) number of each in the row, from 0; two kinds may have one number.
-        shift: (K,) where in the period its kind of mark lies, in periods.
+        start: (2,) place of number 0 for each kind of mark.
     """
 
     period: float
     sigma: float
     chosen: NDArray[np.intp]
     number: NDArray[np.intp]
-    shift: Array
+    start: Array
 
 
 def find_regular(
@@ -54,15 +54,17 @@ def find_regular(
         places: (N,) of the marks.
         sigma: (N,) standard deviations of the places.
         kinds: (N,) 0 or 1.
-        shortest, longest: periods looked for.
+        shortest: period looked for.
+        longest: period looked for.
 
     Returns:
         None where no period stands out from chance.
     """
     if len(places) < 4 or not longest > shortest > 0.0:
         return None
-    steps = int(np.ceil(_STEPS_A_DOUBLING * np.log2(longest / shortest))) + 1
-    periods = np.geomspace(shortest, longest, steps)
+    doublings = float(np.log2(longest / shortest))
+    steps = int(np.ceil(_STEPS_A_DOUBLING * doublings)) + 1
+    periods = shortest * np.exp2(np.linspace(0.0, doublings, steps))
     sharp = sigma < periods[:, None] / _SHARPNESS
     turned = np.exp(2j * np.pi * places / periods[:, None]) * sharp
     aligned = sum(np.abs(turned[:, kinds == kind].sum(axis=1)) for kind in (0, 1))
@@ -86,6 +88,8 @@ def _number(
     for kind in (0, 1):
         turned = np.exp(2j * np.pi * places[sharp & (kinds == kind)] / period)
         offset[kind] = np.angle(turned.sum()) / (2 * np.pi) * period
+    # The two edges of one joint have one number: those that lie nearer together than half a period.
+    offset[1] += np.rint((offset[0] - offset[1]) / period) * period
     number = np.rint((places - offset[kinds]) / period)
     row = np.flatnonzero(sharp & (np.abs(places - offset[kinds] - number * period) < _FAR_OFF * period))
     present = [kind for kind in (0, 1) if (kinds[row] == kind).any()]
@@ -96,10 +100,11 @@ def _number(
         [number[row], number[row] ** 2, *[(kinds[row] == kind).astype(float) for kind in present]]
     )
     weight = np.ones(len(row))
+    tiny = 1e-9 * np.eye(design.shape[1])  # two numbers alone leave the bend open
     for _ in range(_ROUNDS):
         # Least absolute deviations: marks of other things pull no harder the farther off they are.
-        root = np.sqrt(weight)
-        solved = np.linalg.lstsq(design * root[:, None], places[row] * root, rcond=None)[0]
+        weighted = design.T * weight
+        solved = np.linalg.solve(weighted @ design + tiny, weighted @ places[row])
         away = np.abs(places[row] - design @ solved)
         weight = 1.0 / np.maximum(away, _OFF / 4.0 * period)
     near = away < _OFF * period
@@ -112,11 +117,13 @@ def _number(
         return None
     middle = 0.5 * float(counted.min() + counted.max())
     period = float(solved[0] + 2.0 * solved[1] * middle)
-    shift = np.zeros(2)
-    shift[present] = (solved[2:] - solved[2]) / period
+    start = np.zeros(2)
+    # The tangent to the bent row in its middle, so that all of it lies near.
+    start[present] = solved[2:] + (solved[0] - period) * middle + solved[1] * middle**2
+    start += counted.min() * period
     scatter = float(np.sqrt(np.mean(away[run] ** 2)))
     sigma = scatter / float(np.sqrt(np.sum((counted - counted.mean()) ** 2)))
-    return RegularMarks(period, sigma, chosen, counted - counted.min(), shift[kinds[chosen]])
+    return RegularMarks(period, sigma, chosen, counted - counted.min(), start)
 
 
 def _one_each(

@@ -17,7 +17,7 @@ from robot_vision.perception.calibration.findings import (
     KnownLengths,
 )
 from robot_vision.perception.calibration.focal import SharedFocalLength, share_focal_length
-from robot_vision.perception.calibration.height import height_from_corridor
+from robot_vision.perception.calibration.height import height_from_corridor, height_from_stones
 from robot_vision.perception.calibration.mounting import Mounting, find_mounting
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing import VanishingPointEstimator
@@ -200,10 +200,17 @@ class CameraCalibrator:
         pitch: Finding,
         lengths: KnownLengths,
     ) -> Finding:
-        if lengths.corridor_width is None:
+        if not lengths.any:
             return Finding.missing(
                 "no length on the ground was given: a picture alone has no scale", len(pictures)
             )
         if not pitch.known:
             return Finding.missing("without the pitch no distance on the ground is known", len(pictures))
-        return height_from_corridor(pictures, stamps_s, camera, lengths.corridor_width)
+        found = []
+        if lengths.corridor_width is not None:
+            found.append(height_from_corridor(pictures, stamps_s, camera, lengths.corridor_width))
+        if lengths.stone_width is not None or lengths.stone_length is not None:
+            found += height_from_stones(
+                pictures, camera, self.estimator, lengths.stone_width, lengths.stone_length
+            )
+        return min(found, key=lambda finding: finding.sigma)

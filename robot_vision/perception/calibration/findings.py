@@ -23,15 +23,24 @@ class KnownLengths:
 
     Attributes:
         corridor_width: between the feet of the two walls.
+        stone_width: of a flagstone across the way, from the middle of one joint to the middle of the next.
+        stone_length: the same along the way.
     """
 
     corridor_width: float | None = None
+    stone_width: float | None = None
+    stone_length: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("corridor_width",):
+        for name in ("corridor_width", "stone_width", "stone_length"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0.0):
                 raise CalibrationError(f"{name} must be a positive length in m, not {value}")
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return any(value is not None for value in (self.corridor_width, self.stone_width, self.stone_length))
 
 
 @dataclass(frozen=True)
