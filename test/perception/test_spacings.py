@@ -59,7 +59,10 @@ def test_marks_less_sure_than_the_period_is_long_tell_nothing():
 
 @pytest.mark.parametrize("count", [0, 1, 3])
 def test_too_few_marks_are_no_row(count):
-    assert find_regular(np.arange(float(count)), np.full(count, 0.01), np.zeros(count, np.intp), 0.2, 2.0) is None
+    assert (
+        find_regular(np.arange(float(count)), np.full(count, 0.01), np.zeros(count, np.intp), 0.2, 2.0)
+        is None
+    )
 
 
 def test_a_range_of_periods_without_length_has_no_period():
