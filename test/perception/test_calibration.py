@@ -169,6 +169,21 @@ def test_pictures_that_contradict_each_other_are_not_averaged():
     assert "contradict" in found.focal.reason
 
 
+def test_two_level_directions_that_are_not_square_do_not_pass_for_uprights():
+    """A field of plants: rows lead to several level vanishing points, nothing stands upright."""
+    camera = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, pitch=math.radians(30.0))
+    pictures = []
+    for seed in range(24):
+        random = np.random.default_rng(seed)
+        yaw, angle = random.uniform(-0.6, 0.6), math.radians(random.uniform(40.0, 75.0))
+        level = [[math.cos(turn), math.sin(turn), 0.0] for turn in (yaw, yaw + angle)]
+        pictures.append(scene(random, camera, np.array(level) @ camera.optical_to_base, [40] * 2, 0.2).lines)
+    found = CameraCalibrator().calibrate(pictures, replace(camera, pitch=0.0))
+    assert not found.focal.known and "right angles" in found.focal.reason
+    assert not found.roll.known
+    assert not found.pitch.known
+
+
 def test_a_camera_held_by_hand_has_a_focal_length_but_no_mounting():
     pictures = []
     for seed in range(24):

@@ -95,7 +95,7 @@ def test_spacings_level_the_vanishing_point_across(roll, pitch, off, seed):
     up = up_from_attitude(roll, pitch)
     across = tangent_basis(points.directions[1]) @ up
     before = float(across @ points.covariance[1] @ across)
-    assert float(across @ fused.covariance[1] @ across) < 0.5 * before
+    assert float(across @ fused.covariance[1] @ across) < 0.8 * before
     assert np.linalg.eigvalsh(fused.covariance[1])[0] > 0.0
 
 

@@ -91,7 +91,7 @@ class CameraCalibrator:
             raise CalibrationError(f"there are {len(stamps)} stamps for {len(pictures)} pictures")
         camera = camera.rectified()
         count = len(pictures)
-        focal = self._focal(pictures, camera, lambda done: progress(done, 2 * count))
+        focal, crooked = self._focal(pictures, camera, lambda done: progress(done, 2 * count))
         known = camera
         if focal.value is not None:
             stretch = focal.value / camera.fx
@@ -102,7 +102,8 @@ class CameraCalibrator:
         found = self._mounting(pictures, known)
         progress(3 * count // 2, 2 * count)
         doubt = focal.sigma / focal.value if focal.value is not None else 0.0
-        roll, pitch = self._roll(found, count), self._pitch(found, doubt, count)
+        crooked &= found.upright < self.least_level_share * count
+        roll, pitch = self._roll(found, crooked, count), self._pitch(found, doubt, crooked, count)
         known = replace(
             known,
             roll=camera.roll if roll.value is None else roll.value,
@@ -116,7 +117,8 @@ class CameraCalibrator:
 
     def _focal(
         self, pictures: Sequence[LineSegments], camera: Camera, progress: Callable[[int], None]
-    ) -> Finding:
+    ) -> tuple[Finding, bool]:
+        """The focal length, and whether what the pictures show is not built at right angles."""
         # Begin with the longer side of the picture, whatever was given: that is for comparison alone.
         longer = float(max(camera.width, camera.height))
         guess = replace(
@@ -126,15 +128,19 @@ class CameraCalibrator:
         shared = share_focal_length(bundles, self.squareness, progress)
         fault = self._focal_fault(shared, len(pictures))
         own = longer * shared.own
+        crooked = self._often_enough(shared, len(pictures)) and shared.agreement < self.least_agreement
         if fault:
-            return Finding(None, float("inf"), shared.telling, fault, own)
+            return Finding(None, float("inf"), shared.telling, fault, own), crooked
         value = longer * shared.ratio
         reason = f"from right angles on which {100 * shared.agreement:.0f} % of them agree"
-        return Finding(value, value * shared.sigma, shared.telling, reason, own)
+        return Finding(value, value * shared.sigma, shared.telling, reason, own), crooked
+
+    def _often_enough(self, shared: SharedFocalLength, count: int) -> bool:
+        return shared.telling >= max(1.0, self.least_share * count)
 
     def _focal_fault(self, shared: SharedFocalLength, count: int) -> str:
         """Why the focal length is not told, empty when it is."""
-        if shared.telling < max(1.0, self.least_share * count):
+        if not self._often_enough(shared, count):
             seen = "none" if not shared.telling else f"only {shared.telling}"
             return (
                 f"{seen} of {count} pictures show two directions at right angles, both of them oblique; "
@@ -159,35 +165,39 @@ class CameraCalibrator:
                 break
         return found
 
-    def _roll(self, found: Mounting, count: int) -> Finding:
+    def _roll(self, found: Mounting, crooked: bool, count: int) -> Finding:
         sigma = float(np.hypot(np.sqrt(found.covariance[0, 0]), self.squareness))
-        return self._angle("roll", found.roll, sigma, found, 0, count)
+        return self._angle("roll", found.roll, sigma, found, crooked, count)
 
-    def _pitch(self, found: Mounting, focal_doubt: float, count: int) -> Finding:
+    def _pitch(self, found: Mounting, focal_doubt: float, crooked: bool, count: int) -> Finding:
         # A focal length longer by a share e moves a direction at angle p off the axis by e sin(2 p) / 2.
         sigma = float(np.sqrt(found.covariance[1, 1]))
         sigma = float(
             np.hypot(np.hypot(sigma, self.squareness), 0.5 * np.sin(2.0 * found.pitch) * focal_doubt)
         )
-        return self._angle("pitch", found.pitch, sigma, found, 1, count)
+        return self._angle("pitch", found.pitch, sigma, found, crooked, count)
 
     def _angle(
-        self, name: str, value: float, sigma: float, found: Mounting, axis: int, count: int
+        self, name: str, value: float, sigma: float, found: Mounting, crooked: bool, count: int
     ) -> Finding:
+        axis = ("roll", "pitch").index(name)
         told = found.telling[axis]
         own = found.own[:, axis]
         fault = ""
-        if told < self.least_level_share * count:
+        if crooked:
+            fault = (
+                f"{found.upright} of {count} pictures show upright lines, which is too few, "
+                "and what else they show is not built at right angles"
+            )
+        elif told < self.least_level_share * count:
             needed = "upright lines" if name == "roll" else "upright lines or a level vanishing point ahead"
             fault = f"only {told} of {count} pictures tell of the {name}: it wants {needed}"
         elif found.agreement < self.least_agreement:
-            fault = (
-                f"the pictures contradict each other: {100 * found.agreement:.0f} % agree on where upright is"
-            )
+            share = 100 * found.agreement
+            fault = f"the pictures contradict each other: {share:.0f} % agree on where upright is"
         elif not sigma < self.most_lean_doubt:
-            fault = (
-                f"the pictures leave it open by {np.degrees(min(sigma, np.pi)):.1f}°: it wants upright lines"
-            )
+            open_by = np.degrees(min(sigma, np.pi))
+            fault = f"the pictures leave it open by {open_by:.1f}°: it wants upright lines"
         if fault:
             return Finding(None, float("inf"), told, fault, own)
         return Finding(value, sigma, told, "the mean over the pictures, about which the body leans", own)

@@ -43,6 +43,7 @@ class Mounting:
         covariance: (2, 2) of (roll, pitch), rad^2; large for what the pictures do not tell.
         agreement: share of what the pictures know that agrees with it.
         telling: number of pictures that say something of roll, and of pitch.
+        upright: number of pictures that show upright lines.
         own: (N, 2) roll and pitch of each picture by itself, rad; nan where it does not tell both.
     """
 
@@ -51,15 +52,23 @@ class Mounting:
     covariance: Array
     agreement: float
     telling: tuple[int, int]
+    upright: int
     own: Array
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Normal equations of N pictures about one vertical: information (N, 2, 2) and pull (N, 2)."""
+    """Normal equations of N pictures about one vertical.
+
+    Attributes:
+        information: (N, 2, 2) rad^-2.
+        pull: (N, 2) rad^-1.
+        upright: (N,) whether lines of its own tell where the vertical vanishing point is.
+    """
 
     information: Array
     pull: Array
+    upright: NDArray[np.bool_]
 
 
 def find_mounting(pictures: Sequence[VanishingPoints], guess: Array, lean: float) -> Mounting:
@@ -100,13 +109,20 @@ def find_mounting(pictures: Sequence[VanishingPoints], guess: Array, lean: float
     by_angle = np.einsum("ia,nij,ja->na", from_angles, evidence.information, from_angles)
     telling = np.count_nonzero(by_angle > 1.0 / _SHOWN**2, axis=0)
     return Mounting(
-        roll, pitch, covariance, agreement, (int(telling[0]), int(telling[1])), _own(evidence, up)
+        roll,
+        pitch,
+        covariance,
+        agreement,
+        (int(telling[0]), int(telling[1])),
+        int(evidence.upright.sum()),
+        _own(evidence, up),
     )
 
 
 def _evidence(pictures: Sequence[VanishingPoints], up: Array) -> _Evidence:
     basis = tangent_basis(up)
     information, pull = np.zeros((len(pictures), 2, 2)), np.zeros((len(pictures), 2))
+    upright = np.zeros(len(pictures), bool)
     for k, points in enumerate(pictures):
         level = np.isin(points.roles, [Role.PRIMARY, Role.HORIZONTAL])
         directions = points.directions[level]
@@ -122,9 +138,10 @@ def _evidence(pictures: Sequence[VanishingPoints], up: Array) -> _Evidence:
         if vertical is not None:
             carried = basis @ tangent_basis(points.directions[vertical]).T
             own = carried @ told[vertical] @ carried.T
+            upright[k] = np.linalg.eigvalsh(own)[0] > 1.0 / _SHOWN**2
             information[k] += own
             pull[k] += own @ local_coordinates(up, points.directions[vertical])
-    return _Evidence(information, pull)
+    return _Evidence(information, pull, upright)
 
 
 def _told_by_lines(covariance: Array) -> Array:
