@@ -22,6 +22,7 @@ BENCHMARKS = {
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
     "calibration": "focal length, mounting and height from a drive; what flagstones add",
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
+    "centres": "true centres of holes on rendered plates",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "latency": "from picture to steering at 30 Hz, processes over DDS",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",

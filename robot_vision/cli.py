@@ -231,6 +231,44 @@ def calibrate(
 
 
 @app.command()
+def centres(
+    image: Annotated[Path, typer.Argument(help="The picture of a plate with holes, discs or dots.")],
+    output: Annotated[
+        Optional[Path], typer.Option("-o", "--output", help="The picture to write, centres drawn on it.")
+    ] = None,
+    calibration: Annotated[
+        Optional[str],
+        typer.Option(help="A yaml of camera_calibration, or fx,fy,cx,cy[,distortion] in px."),
+    ] = None,
+    normal: Annotated[
+        Optional[str], typer.Option(help="Of the plate: x,y,z, right, down and ahead of the camera.")
+    ] = None,
+    line: Annotated[
+        Optional[str], typer.Option(help="Vanishing line of the plate: a,b,c of a u + b v + c = 0, px.")
+    ] = None,
+    contrast: Annotated[float, typer.Option(help="Least gradient, grey levels a pixel.")] = 6.0,
+    gamma: Annotated[float, typer.Option(help="Of the grey levels; 1 for raw light.")] = 2.2,
+) -> None:
+    """Find the true centres of circles and ellipses on a plate, which perspective shifts from those seen."""
+    from robot_vision.bags.calibration import read_calibration
+    from robot_vision.perception import CentreFinder, EllipseDetector
+    from robot_vision.perception.centres_report import inspect, numbers_of, table, write_drawing
+    from robot_vision.perception.picture import picture_from_compressed
+
+    picture = picture_from_compressed(image.read_bytes())
+    height, width = picture.shape[:2]
+    camera = None if calibration is None else read_calibration(calibration, width, height)
+    finder = CentreFinder(EllipseDetector(contrast, gamma=gamma))
+    plane = numbers_of("normal", normal), numbers_of("line", line)
+    answer, drawing = inspect(picture, finder, camera, *plane)
+    for row in table(answer):
+        typer.echo(row)
+    if output is not None:
+        write_drawing(output, drawing)
+        typer.echo(f"{output}: {len(answer.found)} centres")
+
+
+@app.command()
 def play(
     bag: Annotated[Path, typer.Argument(help="The bag to replay.")],
     rate: Annotated[float, typer.Option(help="Seconds of the bag in a second.")] = 1.0,
