@@ -101,6 +101,17 @@ def test_a_corridor_tells_everything(focal, roll_deg, pitch_deg, height):
     assert found.camera.focal_known
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_few_pictures_tell_less_surely(usual, count):
+    few = Drive(usual.camera, usual.pictures[:count], usual.stamps_s[:count])
+    found = calibrated(few, usual.camera)
+    if found.focal.value is not None:
+        assert abs(found.focal.value - 460.0) < 3.0 * found.focal.sigma
+    assert found.pitch.value is not None, found.pitch.reason
+    assert abs(found.pitch.value - usual.camera.pitch) < 3.0 * found.pitch.sigma
+    assert found.pitch.sigma > calibrated_blind().pitch.sigma
+
+
 def test_the_focal_length_given_is_not_asked(usual):
     blind = calibrated_blind()
     wrong = calibrated(usual, replace(usual.camera, fx=900.0, fy=900.0, pitch=0.0))

@@ -117,8 +117,9 @@ def share_focal_length(
     views = [_view(bundles[k], cells, float(np.exp(start))) for k in told[near]]
     ratio, sigma = _fit_together([view for view in views if view is not None], start, squareness)
     # Looked at with a common focal length, pictures seem more alike than they are.
-    alone = block_sigma(np.log(own[told[near]]), believed[near])
-    sigma = float(np.hypot(sigma, alone)) if len(told) > 1 else float(np.hypot(sigma, own_sigma[told[0]]))
+    alone = block_sigma(np.log(own[told[near]]), believed[near]) if len(told) > 1 else own_sigma[told[0]]
+    few = _SCATTER / np.sqrt(np.count_nonzero(near))
+    sigma = float(np.linalg.norm([sigma, alone, few]))
     return SharedFocalLength(ratio, sigma, agreement, own, own_sigma)
 
 

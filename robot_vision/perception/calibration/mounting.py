@@ -157,6 +157,8 @@ def _told_by_lines(covariance: Array) -> Array:
 
 def _total_sigma(influence: Array) -> float:
     """Standard deviation of a sum of (N,) influences whose neighbours are alike."""
+    if len(influence) < 2:
+        return 0.0  # what one picture knows of itself is all there is
     return block_sigma(influence * len(influence), np.ones(len(influence)))
 
 
