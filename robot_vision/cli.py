@@ -211,6 +211,10 @@ def calibrate(
     stone_length: Annotated[
         Optional[float], typer.Option(help="Of flagstones along the way, joint to joint, m; likewise.")
     ] = None,
+    row_spacing: Annotated[
+        Optional[float],
+        typer.Option(help="From crop row to crop row, m; gives the height over the leaves, and the pitch."),
+    ] = None,
     pitch: Annotated[
         float, typer.Option(help="Roughly, degrees; where a camera looks down by more than 30.")
     ] = 0.0,
@@ -224,7 +228,7 @@ def calibrate(
     from robot_vision.calibrate import Asked, run_calibration
     from robot_vision.perception.calibration import KnownLengths
 
-    lengths = KnownLengths(corridor_width, stone_width, stone_length)
+    lengths = KnownLengths(corridor_width, stone_width, stone_length, row_spacing)
     asked = Asked(bag, out, calibration, lengths, math.radians(pitch), most)
     if not run_calibration(asked, Console(highlight=False, soft_wrap=True), _progress):
         raise typer.Exit(1)

@@ -78,6 +78,15 @@ def test_stones_tell_the_height(tmp_path: Path) -> None:
     assert "the stones' width of 0.4 m" in result.output
 
 
+def test_crop_rows_tell_the_pitch_and_the_height_over_their_leaves(tmp_path: Path) -> None:
+    result = calibrate(BAGS / "field.mcap", tmp_path, "--row-spacing", "0.5")
+    assert result.exit_code == 0, result.output
+    place = parameters(tmp_path)
+    assert place["camera.pitch"] == pytest.approx(math.radians(35.0), abs=math.radians(1.0))
+    assert 1.4 - 0.12 < place["camera.height"] < 1.4
+    assert "over their leaves" in result.output
+
+
 def test_a_winding_road_tells_no_focal_length_and_the_one_given_is_kept(tmp_path: Path) -> None:
     result = calibrate(BAGS / "road.mcap", tmp_path)
     assert "not told" in result.output

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ from robot_vision.bags.messages import picture, stamp_ns
 from robot_vision.demo.answers import picture_topic_of
 from robot_vision.geometry import Camera
 from robot_vision.perception import LineDetector, LineSegments
+from robot_vision.perception.calibration import Plants, green_of
 from robot_vision.perception.picture import PictureError, to_gray
 
 Gray = NDArray[np.uint8]
@@ -32,6 +34,7 @@ class Drive:
         camera: raw camera as given; `Camera.uncalibrated` when nobody says anything of it.
         lines: of each picture, rectified px.
         stamps_s: time of each picture, s.
+        plants: what is green in each picture; None where that was not looked for, or all of it None.
         example: the rectified grey picture from the middle of the drive.
         example_at: which picture that is.
         warnings: what could not be used, one sentence each.
@@ -41,12 +44,15 @@ class Drive:
     camera: Camera
     lines: list[LineSegments]
     stamps_s: list[float]
+    plants: list[Plants | None]
     example: Gray
     example_at: int
     warnings: tuple[str, ...]
 
 
-def read_drive(bag: Path, calibration: str | None, most: int, progress: Progress) -> Drive:
+def read_drive(
+    bag: Path, calibration: str | None, most: int, progress: Progress, most_green: int = 0
+) -> Drive:
     """Find the lines in the pictures of a bag, in at most `most` of them, evenly chosen.
 
     Args:
@@ -54,6 +60,7 @@ def read_drive(bag: Path, calibration: str | None, most: int, progress: Progress
         calibration: as `read_calibration` takes it; None: the bag's own `camera_info`, if it has one.
         most: pictures to look at.
         progress: called with pictures done and in all.
+        most_green: pictures in which to look for plants.
 
     Raises:
         BagError: the bag or the calibration cannot be used, or no picture can be read.
@@ -62,11 +69,13 @@ def read_drive(bag: Path, calibration: str | None, most: int, progress: Progress
     topic = picture_topic_of(reader)
     count = reader.topics[topic].count
     every = max(1, -(-count // most))
+    every_green = every * max(1, -(-count // (every * most_green))) if most_green else count + 1
     detector = LineDetector()
     camera: Camera | None = None
     maps: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
     lines: list[LineSegments] = []
     stamps: list[float] = []
+    plants: list[Plants | None] = []
     example, example_at = np.zeros((0, 0), np.uint8), 0
     faults: list[str] = []
     for number, message in enumerate(reader.messages([topic])):
@@ -74,7 +83,8 @@ def read_drive(bag: Path, calibration: str | None, most: int, progress: Progress
             continue
         decoded = decode(message.cdr, message.type_name)
         try:
-            gray = np.ascontiguousarray(_gray(picture(decoded)))
+            pixels = picture(decoded)
+            gray = np.ascontiguousarray(_gray(pixels))
         except PictureError as cause:
             faults.append(f"picture {number} is left out: {cause}")
             continue
@@ -86,9 +96,10 @@ def read_drive(bag: Path, calibration: str | None, most: int, progress: Progress
             expected = f"{camera.width} x {camera.height}"
             faults.append(f"picture {number} is left out: it is {width} x {height}, not {expected}")
             continue
-        if maps is not None:
-            gray = np.asarray(cv2.remap(gray, *maps, cv2.INTER_LINEAR), np.uint8)
+        gray = _rectified(gray, maps)
         lines.append(detector.detect(gray))
+        green = pixels.ndim == 3 and number % every_green == 0
+        plants.append(green_of(_rectified(pixels, maps)) if green else None)
         stamps.append(1e-9 * stamp_ns(decoded))
         if number <= count // 2:
             example, example_at = gray, len(lines) - 1
@@ -104,10 +115,17 @@ def read_drive(bag: Path, calibration: str | None, most: int, progress: Progress
         camera,
         [lines[k] for k in order],
         [stamps[k] for k in order],
+        [plants[k] for k in order],
         example,
         order.index(example_at),
         warnings,
     )
+
+
+def _rectified(pixels: NDArray[Any], maps: tuple[Any, Any] | None) -> NDArray[np.uint8]:
+    if maps is None:
+        return np.asarray(pixels, np.uint8)
+    return np.asarray(cv2.remap(pixels, *maps, cv2.INTER_LINEAR), np.uint8)
 
 
 def _gray(pixels: NDArray[np.generic]) -> Gray:

@@ -20,6 +20,8 @@ from robot_vision.perception.calibration.lens import with_focal_length
 if TYPE_CHECKING:
     from rich.console import Console
 
+#: Rows are looked for in so many pictures at most: it takes long, and they hardly differ.
+_MOST_GREEN = 40
 Show = Callable[[int, int | None], None]
 Shown = Callable[[str], AbstractContextManager[Show]]
 
@@ -62,12 +64,18 @@ def run_calibration(asked: Asked, console: Console, shown: Shown) -> bool:
     from robot_vision.calibrate.plot import write_plot
 
     with shown("lines") as progress:
-        drive = read_drive(asked.bag, asked.calibration, asked.most, progress)
+        most_green = 0 if asked.lengths.row_spacing is None else _MOST_GREEN
+        drive = read_drive(asked.bag, asked.calibration, asked.most, progress, most_green)
     for warning in drive.warnings:
         console.print(f"warning: {warning}", markup=False)
     with shown("calibrating") as progress:
         found = CameraCalibrator().calibrate(
-            drive.lines, replace(drive.camera, pitch=asked.pitch), drive.stamps_s, asked.lengths, progress
+            drive.lines,
+            replace(drive.camera, pitch=asked.pitch),
+            drive.stamps_s,
+            asked.lengths,
+            drive.plants,
+            progress,
         )
     print_report(found, console)
     try:

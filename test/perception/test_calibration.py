@@ -220,7 +220,7 @@ def test_a_length_that_is_not_seen_gives_no_height(usual):
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-@pytest.mark.parametrize("name", ["corridor_width", "stone_width", "stone_length"])
+@pytest.mark.parametrize("name", ["corridor_width", "stone_width", "stone_length", "row_spacing"])
 def test_lengths_without_meaning_are_refused(name, value):
     with pytest.raises(CalibrationError, match=name):
         KnownLengths(**{name: value})

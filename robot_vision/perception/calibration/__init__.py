@@ -8,5 +8,14 @@ from robot_vision.perception.calibration.findings import (
     Finding,
     KnownLengths,
 )
+from robot_vision.perception.calibration.rows import Plants, green_of
 
-__all__ = ["CalibrationError", "CameraCalibration", "CameraCalibrator", "Finding", "KnownLengths"]
+__all__ = [
+    "CalibrationError",
+    "CameraCalibration",
+    "CameraCalibrator",
+    "Finding",
+    "KnownLengths",
+    "Plants",
+    "green_of",
+]

@@ -19,6 +19,7 @@ from robot_vision.perception.calibration.findings import (
 from robot_vision.perception.calibration.focal import SharedFocalLength, share_focal_length
 from robot_vision.perception.calibration.height import height_from_corridor, height_from_stones
 from robot_vision.perception.calibration.mounting import Mounting, find_mounting
+from robot_vision.perception.calibration.rows import Plants, RowFinder, pitch_and_height_from_rows
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing import VanishingPointEstimator
 from robot_vision.perception.vanishing.bundle import Bundle
@@ -52,6 +53,7 @@ class CameraCalibrator:
         least_agreement: share of the pictures that must agree, each counted by how sure it is.
         least_share: share of the pictures that must say something of the focal length.
         least_level_share: share of the pictures that must say something of roll or pitch.
+        rows: finder of crop rows.
     """
 
     estimator: VanishingPointEstimator = field(default_factory=VanishingPointEstimator)
@@ -62,6 +64,7 @@ class CameraCalibrator:
     least_agreement: float = 0.7
     least_share: float = 0.15
     least_level_share: float = 0.5
+    rows: RowFinder = field(default_factory=RowFinder)
 
     def calibrate(
         self,
@@ -69,6 +72,7 @@ class CameraCalibrator:
         camera: Camera,
         stamps_s: Sequence[float] | None = None,
         lengths: KnownLengths | None = None,
+        plants: Sequence[Plants | None] | None = None,
         progress: Progress = lambda done, total: None,
     ) -> CameraCalibration:
         """Find what the pictures tell of their camera.
@@ -79,16 +83,23 @@ class CameraCalibrator:
                 only when the pictures do not tell; its roll and pitch say where the search begins.
             stamps_s: (N,) times of the pictures, s; needed for a corridor's width; 0.1 s apart when not given.
             lengths: known lengths on the ground.
+            plants: (N,) what is green in the pictures, None where that was not looked for; needed for a row spacing,
+                which also tells the pitch where nothing built does.
             progress: called with steps done and in all.
 
         Raises:
-            CalibrationError: when there are no pictures, or not as many stamps.
+            CalibrationError: when there are no pictures, or not as many stamps or plants.
         """
         if not pictures:
             raise CalibrationError("there is no picture to calibrate from")
         stamps = [0.1 * k for k in range(len(pictures))] if stamps_s is None else list(stamps_s)
         if len(stamps) != len(pictures):
             raise CalibrationError(f"there are {len(stamps)} stamps for {len(pictures)} pictures")
+        if plants is not None and len(plants) != len(pictures):
+            raise CalibrationError(
+                f"there are plants of {len(plants)} pictures, but lines of {len(pictures)}"
+            )
+        lengths = lengths or KnownLengths()
         camera = camera.rectified()
         count = len(pictures)
         focal, crooked = self._focal(pictures, camera, lambda done: progress(done, 2 * count))
@@ -104,12 +115,15 @@ class CameraCalibrator:
         doubt = focal.sigma / focal.value if focal.value is not None else 0.0
         crooked &= found.upright < self.least_level_share * count
         roll, pitch = self._roll(found, crooked, count), self._pitch(found, doubt, crooked, count)
-        known = replace(
-            known,
-            roll=camera.roll if roll.value is None else roll.value,
-            pitch=camera.pitch if pitch.value is None else pitch.value,
-        )
-        height = self._height(pictures, stamps, known, pitch, lengths or KnownLengths())
+        known = replace(known, roll=camera.roll if roll.value is None else roll.value)
+        heights = []
+        if lengths.row_spacing is not None and plants is not None:
+            by_rows, height = pitch_and_height_from_rows(plants, known, lengths.row_spacing, self.rows)
+            pitch = pitch if pitch.known else by_rows
+            heights.append(height)
+        known = replace(known, pitch=camera.pitch if pitch.value is None else pitch.value)
+        heights += self._heights(pictures, stamps, known, pitch, lengths)
+        height = min(heights, key=lambda finding: finding.sigma)
         progress(2 * count, 2 * count)
         if height.value is not None:
             known = replace(known, height_m=height.value)
@@ -202,20 +216,23 @@ class CameraCalibrator:
             return Finding(None, float("inf"), told, fault, own)
         return Finding(value, sigma, told, "the mean over the pictures, about which the body leans", own)
 
-    def _height(
+    def _heights(
         self,
         pictures: Sequence[LineSegments],
         stamps_s: Sequence[float],
         camera: Camera,
         pitch: Finding,
         lengths: KnownLengths,
-    ) -> Finding:
+    ) -> list[Finding]:
+        """One finding for each length of a corridor or of stones; without any, why there is no height."""
+        built = (lengths.corridor_width, lengths.stone_width, lengths.stone_length)
         if not lengths.any:
-            return Finding.missing(
-                "no length on the ground was given: a picture alone has no scale", len(pictures)
-            )
+            reason = "no length on the ground was given: a picture alone has no scale"
+            return [Finding.missing(reason, len(pictures))]
+        if not any(built):
+            return [Finding.missing("the plants of the rows were not looked for", len(pictures))]
         if not pitch.known:
-            return Finding.missing("without the pitch no distance on the ground is known", len(pictures))
+            return [Finding.missing("without the pitch no distance on the ground is known", len(pictures))]
         found = []
         if lengths.corridor_width is not None:
             found.append(height_from_corridor(pictures, stamps_s, camera, lengths.corridor_width))
@@ -223,4 +240,4 @@ class CameraCalibrator:
             found += height_from_stones(
                 pictures, camera, self.estimator, lengths.stone_width, lengths.stone_length
             )
-        return min(found, key=lambda finding: finding.sigma)
+        return found

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,22 +25,24 @@ class KnownLengths:
         corridor_width: between the feet of the two walls.
         stone_width: of a flagstone across the way, from the middle of one joint to the middle of the next.
         stone_length: the same along the way.
+        row_spacing: from one crop row to the next.
     """
 
     corridor_width: float | None = None
     stone_width: float | None = None
     stone_length: float | None = None
+    row_spacing: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("corridor_width", "stone_width", "stone_length"):
-            value = getattr(self, name)
+        for length in fields(self):
+            value = getattr(self, length.name)
             if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise CalibrationError(f"{name} must be a positive length in m, not {value}")
+                raise CalibrationError(f"{length.name} must be a positive length in m, not {value}")
 
     @property
     def any(self) -> bool:
         """Whether there is one."""
-        return any(value is not None for value in (self.corridor_width, self.stone_width, self.stone_length))
+        return any(getattr(self, length.name) is not None for length in fields(self))
 
 
 @dataclass(frozen=True)
