@@ -20,6 +20,7 @@ BENCHMARKS = {
     "york": "vanishing points of single real pictures",
     "kitti": "the way ahead on a real road, through the real nodes",
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
+    "calibration": "focal length, mounting and height from a drive; what flagstones add",
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
     "centres": "true centres of holes on rendered plates",
     "lines": "cost of finding lines, beside OpenCV's LSD",
@@ -56,7 +57,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
-    about = "\n".join(f"  {name:<10}{text}" for name, text in BENCHMARKS.items())
+    about = "\n".join(f"  {name:<12}{text}" for name, text in BENCHMARKS.items())
     parser = argparse.ArgumentParser(
         "python -m bench",
         description="Measure accuracy and latency, beside the marks to reach.",

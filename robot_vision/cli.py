@@ -192,6 +192,49 @@ def simulate(
 
 
 @app.command()
+def calibrate(
+    bag: Annotated[Path, typer.Argument(help="A drive past walls, doors, houses or pavement.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path("out"),
+    calibration: Annotated[
+        Optional[str],
+        typer.Option(
+            help="What is known of the camera, as make-bag takes it [the bag's camera_info]: its lens and "
+            "centre are used, its focal length only where the pictures do not tell."
+        ),
+    ] = None,
+    corridor_width: Annotated[
+        Optional[float], typer.Option(help="Between the feet of the two walls, m; gives the height.")
+    ] = None,
+    stone_width: Annotated[
+        Optional[float], typer.Option(help="Of flagstones across the way, joint to joint, m; likewise.")
+    ] = None,
+    stone_length: Annotated[
+        Optional[float], typer.Option(help="Of flagstones along the way, joint to joint, m; likewise.")
+    ] = None,
+    row_spacing: Annotated[
+        Optional[float],
+        typer.Option(help="From crop row to crop row, m; gives the height over the leaves, and the pitch."),
+    ] = None,
+    pitch: Annotated[
+        float, typer.Option(help="Roughly, degrees; where a camera looks down by more than 30.")
+    ] = 0.0,
+    most: Annotated[int, typer.Option(min=1, help="Pictures to look at, evenly chosen.")] = 600,
+) -> None:
+    """Find focal length, roll, pitch and height of a camera from its own drive, and how sure they are."""
+    import math
+
+    from rich.console import Console
+
+    from robot_vision.calibrate import Asked, run_calibration
+    from robot_vision.perception.calibration import KnownLengths
+
+    lengths = KnownLengths(corridor_width, stone_width, stone_length, row_spacing)
+    asked = Asked(bag, out, calibration, lengths, math.radians(pitch), most)
+    if not run_calibration(asked, Console(highlight=False, soft_wrap=True), _progress):
+        raise typer.Exit(1)
+
+
+@app.command()
 def centres(
     image: Annotated[Path, typer.Argument(help="The picture of a plate with holes, discs or dots.")],
     output: Annotated[

@@ -19,7 +19,18 @@ from robot_vision.bags import BagReader, BagWriter, messages, score_heading
 from robot_vision.ros.domains import FreeDomain
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = {"demo", "run", "play", "record", "make-bag", "simulate", "centres", "bench", "doctor"}
+COMMANDS = {
+    "demo",
+    "run",
+    "play",
+    "record",
+    "make-bag",
+    "simulate",
+    "calibrate",
+    "centres",
+    "bench",
+    "doctor",
+}
 
 
 def robot_vision(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -70,7 +70,7 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
         up = retract(up, np.asarray(np.linalg.solve(information, pull), dtype=np.float64))
     up_covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     roll, pitch = attitude_from_up(up)
-    jacobian = _tangent_of_attitude(up, roll, pitch)
+    jacobian = tangent_of_attitude(up, roll, pitch)
     inverse = np.linalg.inv(jacobian)
     telling = np.isin(points.roles, [Role.PRIMARY, Role.VERTICAL, Role.HORIZONTAL])
     seen = bool(np.any(telling & (points.weight > 0.0)))
@@ -78,7 +78,7 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     return Attitude(roll, pitch, covariance, up, up_covariance, seen)
 
 
-def _tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
+def tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
     """How `up` moves in its tangent plane with roll and pitch: (2, 2), by central differences."""
     step = 1e-6
     columns = [
