@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ways to a goal: on grids of free floor, and through mazes that are known or not yet."""
 
+from robot_vision.planning.clearance import room_around, with_clearance
+from robot_vision.planning.descent import descend
 from robot_vision.planning.distance import ExactField, distance_field, exact_field, shortest_way
+from robot_vision.planning.fields import connected_field, cost_field
 from robot_vision.planning.grid import NoWayError, PlanningError
 from robot_vision.planning.maze import Maze, MazeError
+from robot_vision.planning.path import nearest_reachable, plan_path
 
 __all__ = [
     "ExactField",
@@ -11,7 +15,14 @@ __all__ = [
     "MazeError",
     "NoWayError",
     "PlanningError",
+    "connected_field",
+    "cost_field",
+    "descend",
     "distance_field",
     "exact_field",
+    "nearest_reachable",
+    "plan_path",
+    "room_around",
     "shortest_way",
+    "with_clearance",
 ]
