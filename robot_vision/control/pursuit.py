@@ -17,8 +17,9 @@ _FIRST_STEP, _LONGEST_STEP = 0.05, 0.25
 class PathPursuit:
     """Pure pursuit of a way (Coulter 1992), within limits of speed, turn rate and acceleration.
 
-    The robot aims at the point of the way `lookahead` metres on from the point of it that is nearest to the robot. When
-    that lies more than `turn_on_spot` to the side, it stands and turns first.
+    The robot aims at the point of the way `lookahead` metres on from the point of it that is nearest to the robot.
+    When that lies more than `turn_on_spot` to the side, it stands and turns first. What was said last is still under
+    way when the next pose comes: the pose is carried on by `latency` seconds of it before the robot aims.
 
     Args:
         speed: on a straight way, m/s.
@@ -27,7 +28,8 @@ class PathPursuit:
         most_acceleration: of the speed and of braking, m/s^2.
         most_turn_acceleration: rad/s^2.
         turn_on_spot: rad.
-        slowing: for the point aimed at, m/s of speed lost for each rad it lies to the side, as a share of `speed`.
+        slowing: share of the speed lost for each radian that the point aimed at lies to the side.
+        latency: from a pose to the moment the robot moves as told, s.
 
     Raises:
         ValueError: naming the setting that is not a positive number.
@@ -40,6 +42,7 @@ class PathPursuit:
     most_turn_acceleration: float = 3.0
     turn_on_spot: float = 0.7
     slowing: float = 1.2
+    latency: float = 0.1
     _last: Steering = field(default_factory=lambda: Steering(0.0, 0.0), init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
 
@@ -72,15 +75,16 @@ class PathPursuit:
             self.reset()
             return Steering(0.0, 0.0, "no way" if len(points) == 0 else "the robot's place is no number")
         seconds = self._seconds_since(stamp_s)
-        along, target, left = _ahead(points, pose[:2], self.lookahead)
-        away = target - pose[:2]
+        x, y, yaw = self._carried_on(pose)
+        along, target, left = _ahead(points, (x, y), self.lookahead)
+        away = target - (x, y)
         distance = float(np.hypot(*away))
         left = min(left, seen - along)
         room = min(left, distance) if left <= self.lookahead else left
         if room <= 1e-3:
             self.reset()
             return Steering(0.0, 0.0)
-        bearing = float((np.arctan2(away[1], away[0]) - pose[2] + np.pi) % (2 * np.pi) - np.pi)
+        bearing = float((np.arctan2(away[1], away[0]) - yaw + np.pi) % (2 * np.pi) - np.pi)
         most = speed_to_stop_within(room, self.most_acceleration)
         if abs(bearing) > self.turn_on_spot:
             wanted, turn = 0.0, self._turn_towards(bearing)
@@ -95,6 +99,11 @@ class PathPursuit:
         turn = approach(self._last.turn_rate, turn, self.most_turn_acceleration * seconds)
         self._last = Steering(max(speed, 0.0), turn)
         return self._last
+
+    def _carried_on(self, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+        way, turn = self._last.speed * self.latency, self._last.turn_rate * self.latency
+        middle = pose[2] + turn / 2
+        return pose[0] + way * float(np.cos(middle)), pose[1] + way * float(np.sin(middle)), pose[2] + turn
 
     def _turn_towards(self, bearing: float) -> float:
         """Turn rate on the spot, from which the robot can stop in time when it looks there."""

@@ -39,7 +39,9 @@ def with_clearance(free: ArrayLike, clearance: float, resolution: float = 1.0) -
     return np.asarray(grid & (room_around(grid, resolution) >= clearance - 1e-6 * resolution))
 
 
-def price_of_nearness(free: ArrayLike, wide: float, most: float, resolution: float = 1.0) -> NDArray[np.float64]:
+def price_of_nearness(
+    free: ArrayLike, wide: float, most: float, resolution: float = 1.0
+) -> NDArray[np.float64]:
     """Prices that draw ways to the middle: 1 from `wide` metres of room on, rising to 1 + `most` at walls, inf in them.
 
     Raises:

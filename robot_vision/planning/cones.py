@@ -42,13 +42,13 @@ FULL = -1
 
 @njit(cache=True, error_model="numpy")
 def _up(a, b):
-    """a / b rounded up, for b > 0; in double precision, which is exact as long as |a| < 2**52."""
+    """A / b rounded up, for b > 0; in double precision, which is exact as long as |a| < 2**52."""
     return int(math.ceil(a / b))
 
 
 @njit(cache=True, error_model="numpy")
 def _down(a, b):
-    """a / b rounded down, likewise: a quotient that is no whole number is 1 / b or more away from one."""
+    """A / b rounded down, likewise: a quotient that is no whole number is 1 / b or more away from one."""
     return int(math.floor(a / b))
 
 
@@ -277,7 +277,9 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                 # a cone between two centres is judged by the cells on either side of it
                 first, last = (low, high) if low <= high else (max(start, low - 1), min(low, end - 1))
                 base_less = base - TOLERANCE
-                reach = _covered_from_left(distance, r - 1, first, last, hx, origin, x0, height2, base_less, begin)
+                reach = _covered_from_left(
+                    distance, r - 1, first, last, hx, origin, x0, height2, base_less, begin
+                )
                 if reach >= finish or reach >= 0.5 * b:
                     continue
                 cut = int(math.floor(2.0 * reach))
@@ -286,7 +288,9 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                     low = max(low, (cut + off) >> 1)
                 if finish < np.inf or wall_right:
                     edge = min(finish, 0.5 * b)
-                    reach = _covered_from_right(distance, r - 1, low, high, hx, origin, x0, height2, base_less, edge)
+                    reach = _covered_from_right(
+                        distance, r - 1, low, high, hx, origin, x0, height2, base_less, edge
+                    )
                     cut = int(math.ceil(2.0 * reach))
                     if reach < edge and (rv == 0 or cut * rv < ru * middle):
                         ru, rv = cut, middle

@@ -47,7 +47,7 @@ def spread_to_four(free, goal, until, distance):
 
 @njit(cache=True)
 def spread_to_eight(free, goal, until, distance):
-    """Sum steps of 1 and sqrt(2) to the eight neighbours (Dijkstra), never diagonally past a wall; arguments as above."""
+    """Sum steps of 1 and sqrt(2) to the eight neighbours (Dijkstra), never diagonally past a wall; see above."""
     columns = distance.shape[1]
     closed = np.zeros(distance.shape, np.bool_)
     keys, items, waiting = np.zeros(1024), np.zeros(1024, np.int64), 1

@@ -46,13 +46,17 @@ def descend(
 
     heights = np.asarray(field, np.float64)
     if heights.ndim != 2 or 0 in heights.shape:
-        raise PlanningError(f"field must be a grid of rows and columns, not an array of shape {heights.shape}")
+        raise PlanningError(
+            f"field must be a grid of rows and columns, not an array of shape {heights.shape}"
+        )
     cell = checked_cell(heights.shape, start, "start")
     if not np.isfinite(heights[cell]):
         raise NoWayError(f"no way leads from {cell} to the goal")
     prices = checked_cost(np.where(np.isfinite(heights), 1.0, np.inf) if cost is None else cost)
     if prices.shape != (heights.shape[0] + 2, heights.shape[1] + 2):
-        raise PlanningError(f"cost must have the shape {heights.shape} of the field, not {np.shape(cost)}")
+        raise PlanningError(
+            f"cost must have the shape {heights.shape} of the field, not {(prices.shape[0] - 2, prices.shape[1] - 2)}"
+        )
     steps = _steps_down(np.pad(heights, 1, constant_values=np.inf), (cell[0] + 1, cell[1] + 1))
     if heights[steps[-1][0] - 1, steps[-1][1] - 1] != np.min(heights):
         raise NoWayError(
@@ -62,7 +66,7 @@ def descend(
     cells = np.array(steps)
     if cost is None:
         return _shortest_nearby(np.isfinite(prices[1:-1, 1:-1]), cells - 1)
-    return pulled_taut(prices, cells).astype(np.float64) - 1.0
+    return np.asarray(pulled_taut(prices, cells) - 1.0)
 
 
 def _shortest_nearby(free: NDArray[np.bool_], cells: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from robot_vision.planning.grid import (
     Cell,
     NoWayError,
-    PlanningError,
     checked_cell,
     checked_free_cell,
     checked_grid,
@@ -144,11 +143,6 @@ def shortest_way(free: ArrayLike, start: Sequence[float], goal: Sequence[float])
     if not np.isfinite(distance[ends[0]]):
         raise NoWayError(f"no way leads from {begin} to {end}: walls lie between them")
     return ExactField(distance, roots, corners, before, 1.0).way_from(ends[0]) + offset
-
-
-def warm_up() -> None:
-    """Compile what is compiled, or load it from the disk."""
-    distance_field(np.ones((2, 2), np.bool_), (0, 0), until=(1, 1))
 
 
 _NO_ROOTS = np.zeros((0, 0), np.int32)

@@ -83,9 +83,7 @@ class MazeExplorer:
             self._look(known, cell)
             if to_goal is None and cell in maze.goals:
                 to_goal = len(track) - 1
-        return Exploration(
-            to_goal, to_proof, len(track) - 1, known.shortest_path(), track, known.as_maze()
-        )
+        return Exploration(to_goal, to_proof, len(track) - 1, known.shortest_path(), track, known.as_maze())
 
     def _look(self, known: KnownMaze, cell: Cell) -> None:
         row, column = cell

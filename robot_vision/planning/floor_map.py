@@ -76,7 +76,8 @@ class FloorMap:
         """The reverse of `to_cells`."""
         rows, columns = (self.resolution * (np.asarray(points, np.float64).reshape(-1, 2) + 0.5)).T
         cos, sin = np.cos(self.origin[2]), np.sin(self.origin[2])
-        return np.column_stack([cos * columns - sin * rows, sin * columns + cos * rows]) + self.origin[:2]
+        turned = np.column_stack([cos * columns - sin * rows, sin * columns + cos * rows])
+        return np.asarray(turned + self.origin[:2])
 
     def is_laid_out_as(self, other: FloorMap) -> bool:
         """Whether the cells of both are the same places."""

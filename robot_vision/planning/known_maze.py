@@ -30,9 +30,8 @@ class KnownMaze:
         self._open = np.ones((2, *size), np.bool_)
         """As far as is known: to the east [0] and to the north [1] of each cell."""
         self._seen = np.zeros((2, *size), np.bool_)
-        for side, edge in ((0, np.s_[:, -1]), (1, np.s_[-1])):
-            self._open[(side, *_tuple(edge))] = False
-            self._seen[(side, *_tuple(edge))] = True
+        self._open[0, :, -1] = self._open[1, -1] = False
+        self._seen[0, :, -1] = self._seen[1, -1] = True
 
     @classmethod
     def all_of(cls, maze: Maze) -> KnownMaze:
@@ -122,9 +121,7 @@ class KnownMaze:
 
     def as_maze(self) -> Maze:
         """The same as a `Maze`, what has not been seen marked unknown."""
-        return Maze(
-            ~self._open[0], ~self._open[1], self.start, self.goals, ~self._seen[0], ~self._seen[1]
-        )
+        return Maze(~self._open[0], ~self._open[1], self.start, self.goals, ~self._seen[0], ~self._seen[1])
 
     def _place(self, cell: Cell, direction: int) -> tuple[int, int, int] | None:
         """Where a wall beside a cell is kept; None for the outer walls in the south and west."""
@@ -139,7 +136,3 @@ class KnownMaze:
 def beside(cell: Cell, direction: int) -> Cell:
     """The neighbour of a cell in one of the `DIRECTIONS`."""
     return cell[0] + DIRECTIONS[direction][0], cell[1] + DIRECTIONS[direction][1]
-
-
-def _tuple(index: object) -> tuple[object, ...]:
-    return index if isinstance(index, tuple) else (index,)

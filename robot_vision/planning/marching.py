@@ -9,9 +9,9 @@ the goal: D has all the kinks, and its gradient is known, the unit vector away f
 
     grad T = D grad tau + tau grad D,
 
-where tau is smooth: 1 everywhere on an even floor. Its differences are one-sided, of the second order where two accepted
-cells stand in line. Along an axis without accepted neighbours T does not change, as in the plain method; but where a wall
-or a farther cell stands upstream on it, tau does not.
+where tau is smooth: 1 everywhere on an even floor. Its differences are one-sided, of the second order where two
+accepted cells stand in line. Along an axis without accepted neighbours T does not change, as in the plain method; but
+where a wall or a farther cell stands upstream on it, tau does not.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _axis(travel, distance, state, row, column, down, right, slope):
     if nearest == np.inf and slope != 0.0:
         side = -1 if slope > 0.0 else 1
         if distance[row + side * down, column + side * right] >= d:
-            a = slope  # a wall stands upstream, or all comes from the side: what can be said is that tau does not change
+            a = slope  # a wall stands upstream, or all comes from the side: tau is taken not to change
     return nearest, a, b
 
 

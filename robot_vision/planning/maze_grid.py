@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,9 +50,7 @@ def maze_to_grid(maze: Maze, pitch: int = 8, wall: int = 1) -> NDArray[np.int8]:
     return grid
 
 
-def maze_from_grid(
-    grid: ArrayLike, pitch: int, wall: int, start: Cell, goals: Sequence[Cell]
-) -> Maze:
+def maze_from_grid(grid: ArrayLike, pitch: int, wall: int, start: Cell, goals: Sequence[Cell]) -> Maze:
     """A maze from an occupancy grid as `maze_to_grid` makes it; each wall is what most of its strip is.
 
     Args:
@@ -87,15 +86,13 @@ def maze_from_grid(
     )
 
 
-def _strips(values: NDArray[np.generic], pitch: int, wall: int) -> NDArray[np.int8]:
+def _strips(values: NDArray[np.integer[Any]], pitch: int, wall: int) -> NDArray[np.int8]:
     """What most of each upright strip between two posts is, (R, C + 1)."""
     rows, columns = ((size - wall) // pitch for size in values.shape)
     found = np.zeros((rows, columns + 1), np.int8)
     for row in range(rows):
         for column in range(columns + 1):
-            strip = values[
-                row * pitch + wall : (row + 1) * pitch, column * pitch : column * pitch + wall
-            ]
+            strip = values[row * pitch + wall : (row + 1) * pitch, column * pitch : column * pitch + wall]
             shares = np.mean(strip >= OCCUPIED_FROM), np.mean(strip < 0)
             found[row, column] = OCCUPIED if shares[0] >= 0.5 else UNKNOWN if shares[1] >= 0.5 else FREE
     return found

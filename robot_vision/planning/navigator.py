@@ -40,14 +40,17 @@ class Route:
 
 
 _NOWHERE = np.zeros((0, 2))
+_LEAST = {"radius": 0.0, "middle": 0.0, "frontier": 0.0, "astray": 1e-3, "arrival": 1e-3}
+"""Metres."""
 
 
 @dataclass
 class Navigator:
     """Plans where to drive; plans anew only if something that matters has changed.
 
-    A way is kept as long as the map leaves all its cells free, no cell has become free that could lie on a shorter one,
-    the goal is the same and the robot is on it. What nobody has seen is planned through only when there is no other way.
+    A way is kept as long as the map leaves all its cells free, no cell has become free that could lie on a shorter
+    one, the goal is the same and the robot is on it. What nobody has seen is planned through only when there is no
+    other way.
 
     Args:
         radius: of the robot, metres: the way keeps so far from every wall.
@@ -67,7 +70,7 @@ class Navigator:
     arrival: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, least in (("radius", 0.0), ("middle", 0.0), ("frontier", 0.0), ("astray", 1e-3), ("arrival", 1e-3)):
+        for name, least in _LEAST.items():
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= least):
                 raise PlanningError(f"{name} must be at least {least:g} m, not {getattr(self, name)}")
         self._mode: Mode = "go"
@@ -84,6 +87,15 @@ class Navigator:
         """What the robot is about."""
         return self._mode
 
+    def use(self, **settings: float) -> None:
+        """Change settings by their names; the map is then looked at with new eyes, if they say otherwise."""
+        if any(getattr(self, name) != value for name, value in settings.items()):
+            for name, value in settings.items():
+                setattr(self, name, value)
+            self._stale = True
+            if self._map is not None:
+                self._measure(self._map)
+
     def set_mode(self, mode: Mode) -> None:
         """Explore, go to the goal, or hold."""
         if mode != self._mode:
@@ -97,26 +109,21 @@ class Navigator:
         """Take a new map, or a changed one."""
         known_before, maybe_before, before = self._known, self._maybe, self._map
         self._map = floor
-        self._maybe = with_clearance(~floor.occupied, self.radius, floor.resolution)
-        self._known = self._maybe & ~floor.unknown
+        self._measure(floor)
         if before is None or not before.is_laid_out_as(floor):
             self._given_up = np.zeros(floor.cells.shape, np.bool_)
             self._target, self._stale = None, True
         elif self._mode == "explore":
             # the way there leads over known floor only; it is kept while its target is worth it
             self._stale = self._stale or bool((known_before & ~self._known).any())
-            self._target = None if self._target is None or not self._frontiers()[self._target] else self._target
+            self._target = (
+                None if self._target is None or not self._frontiers()[self._target] else self._target
+            )
             self._stale = self._stale or self._target is None
         else:
             lost = (known_before & ~self._known) | (maybe_before & ~self._maybe)
             won = (self._known & ~known_before) | (self._maybe & ~maybe_before)
             self._stale = self._stale or self._blocks(lost) or self._shortens(won)
-
-    def forget(self) -> None:
-        """Forget the map and everything about it, as after a clock that jumped back."""
-        goal, mode = self._goal, self._mode
-        self.__post_init__()
-        self._goal, self._mode = goal, mode
 
     def route(self, x: float, y: float) -> Route:
         """The way from where the robot is (m, frame of the map)."""
@@ -139,11 +146,16 @@ class Navigator:
 
     def field(self) -> NDArray[np.float64] | None:
         """Metres from each cell to the end of the present way (R, C), with room for the robot; None without one."""
-        if self._map is None or not len(self._route.points):
+        points = self._route.points
+        if self._map is None or not len(points):
             return None
-        end = self._map.cell_at(*self._route.points[-1], "goal")
+        end = self._map.cell_at(float(points[-1, 0]), float(points[-1, 1]), "goal")
         roomy = self._known if self._known[end] and self._seen_all() else self._maybe
         return distance_field(roomy, end, self._map.resolution)
+
+    def _measure(self, floor: FloorMap) -> None:
+        self._maybe = with_clearance(~floor.occupied, self.radius, floor.resolution)
+        self._known = self._maybe & ~floor.unknown
 
     def _planned(self, x: float, y: float) -> tuple[NDArray[np.float64], float, str]:
         if self._mode == "hold":
@@ -189,7 +201,9 @@ class Navigator:
         way = self._plan(floor, ~floor.occupied & ~floor.unknown, robot, self._target)
         return floor.to_world(way), np.inf, ""
 
-    def _plan(self, floor: FloorMap, passable: NDArray[np.bool_], robot: Cell, goal: Cell) -> NDArray[np.float64]:
+    def _plan(
+        self, floor: FloorMap, passable: NDArray[np.bool_], robot: Cell, goal: Cell
+    ) -> NDArray[np.float64]:
         # what is unknown is no wall: the way need not keep away from it
         roomy = passable & self._maybe
         start = robot

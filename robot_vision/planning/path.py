@@ -64,10 +64,15 @@ def plan_path(
     except NoWayError:
         if not nearest:
             raise
-        way = _way(
-            grid, roomy, entry, nearest_reachable(roomy, entry, end), resolution, clearance, middle
-        )
+        way = _way(grid, roomy, entry, nearest_reachable(roomy, entry, end), resolution, clearance, middle)
     return way if lead_in is None else np.concatenate([lead_in[:-1], way])
+
+
+def warm_up() -> None:
+    """Compile what plans on grids, or load it from the disk."""
+    floor = np.ones((3, 3), np.bool_)
+    for middle in (0.0, 1.0):
+        plan_path(floor, (0, 0), (2, 2), middle=middle)
 
 
 def nearest_reachable(free: ArrayLike, start: Sequence[float], goal: Sequence[float]) -> Cell:

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robot_vision.planning.fields import checked_grid
-from robot_vision.planning.grid import Cell
+from robot_vision.planning.grid import Cell, checked_grid
 from robot_vision.planning.known_maze import KnownMaze
 from robot_vision.planning.maze import Maze
 
@@ -71,8 +70,9 @@ def draw_maze(maze: Maze, path: ArrayLike = (), scale: int = 24, coloured: bool 
     steps = steps_to_goal(maze).astype(np.float64)
     field = np.where(steps < 0, np.inf, steps)
     shown = _colours(field) if coloured else np.full((rows, columns, 3), _PAPER, np.uint8)
-    picture = cv2.resize(shown[::-1], (columns * scale, rows * scale), interpolation=cv2.INTER_NEAREST)
-    picture = cv2.copyMakeBorder(picture, *(margin,) * 4, cv2.BORDER_CONSTANT, value=_PAPER)
+    picture = _enlarged(shown[::-1], scale)
+    framed = cv2.copyMakeBorder(picture, *(margin,) * 4, cv2.BORDER_CONSTANT, value=_PAPER)
+    picture = np.asarray(framed, np.uint8)
 
     def at(row: float, column: float) -> tuple[int, int]:
         return round(margin + column * scale), round(margin + (rows - row) * scale)
@@ -90,7 +90,7 @@ def draw_maze(maze: Maze, path: ArrayLike = (), scale: int = 24, coloured: bool 
         _mark(picture, at(goal[0] + 0.5, goal[1] + 0.5), _GOAL, scale // 5)
     points = np.asarray(path, np.float64).reshape(-1, 2)
     _line(picture, [at(row + 0.5, column + 0.5) for row, column in points], thick)
-    return np.asarray(picture, np.uint8)
+    return picture
 
 
 def draw_field(free: ArrayLike, field: ArrayLike, path: ArrayLike = (), scale: int = 4) -> Picture:
@@ -106,15 +106,14 @@ def draw_field(free: ArrayLike, field: ArrayLike, path: ArrayLike = (), scale: i
     distances = np.asarray(field, np.float64)
     shown = _colours(distances)
     shown[~grid] = _WALL
-    size = (grid.shape[1] * scale, grid.shape[0] * scale)
-    picture = cv2.resize(shown, size, interpolation=cv2.INTER_NEAREST)
+    picture = _enlarged(shown, scale)
     points = np.asarray(path, np.float64).reshape(-1, 2)
     places = [(round((column + 0.5) * scale), round((row + 0.5) * scale)) for row, column in points]
     _line(picture, places, max(1, scale // 2))
     if places:
         _mark(picture, places[0], _START, scale + 2)
         _mark(picture, places[-1], _GOAL, scale + 2)
-    return np.asarray(picture, np.uint8)
+    return picture
 
 
 def _colours(field: NDArray[np.float64]) -> Picture:
@@ -126,6 +125,10 @@ def _colours(field: NDArray[np.float64]) -> Picture:
     shown = np.asarray(cv2.applyColorMap(level, cv2.COLORMAP_VIRIDIS), np.uint8)
     shown[~there] = _NOWHERE
     return shown
+
+
+def _enlarged(shown: Picture, scale: int) -> Picture:
+    return np.repeat(np.repeat(shown, scale, axis=0), scale, axis=1)
 
 
 def _line(picture: Picture, places: Sequence[tuple[int, int]], width: int) -> None:

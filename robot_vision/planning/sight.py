@@ -60,9 +60,7 @@ def pulled_taut(cost, cells):
     count = len(cells)
     along = np.zeros(count)
     for k in range(1, count):
-        along[k] = along[k - 1] + line_cost(
-            cost, cells[k - 1, 0], cells[k - 1, 1], cells[k, 0], cells[k, 1]
-        )
+        along[k] = along[k - 1] + line_cost(cost, cells[k - 1, 0], cells[k - 1, 1], cells[k, 0], cells[k, 1])
     kept = np.zeros(count, np.int64)
     size, here = 1, 0
     while here < count - 1:

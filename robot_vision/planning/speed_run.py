@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fastest run through a known maze: not the fewest cells, but the least time, straights, turns and diagonals weighed.
+"""The fastest run through a known maze: not the fewest cells but the least time, turns and diagonals weighed.
 
 The robot drives from the middle of one opening between cells to the middle of the next: straight through a cell, or
 diagonally across its corner, in eight headings. On each straight piece it speeds up and brakes as hard as it may; every
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.planning.grid import Cell, NoWayError, checked_positive
-from robot_vision.planning.known_maze import KnownMaze, beside
+from robot_vision.planning.known_maze import KnownMaze
 from robot_vision.planning.maze import Maze
 
 Place = tuple[int, int]
@@ -121,7 +121,9 @@ def fastest_run(maze: Maze, racer: Racer | None = None) -> SpeedRun:
         for there, length, ends in _straights(known, place, heading, begin):
             piece = how.straight_time(
                 how.cell * length,
-                *how._within_reach(how.cell * length, 0.0 if place == begin else corner, 0.0 if ends else corner),
+                *how._within_reach(
+                    how.cell * length, 0.0 if place == begin else corner, 0.0 if ends else corner
+                ),
             )
             turns = (0,) if ends else (-3, -2, -1, 1, 2, 3)
             for turn in turns:
@@ -154,9 +156,7 @@ def _is_middle(place: Place) -> bool:
     return place[0] % 2 == 0 and place[1] % 2 == 0
 
 
-def _straights(
-    known: KnownMaze, place: Place, heading: int, begin: Place
-) -> list[tuple[Place, float, bool]]:
+def _straights(known: KnownMaze, place: Place, heading: int, begin: Place) -> list[tuple[Place, float, bool]]:
     """Where a straight piece may end: the place, its length in cells, and whether the run ends there."""
     down, right = _HEADINGS[heading]
     straight = down == 0 or right == 0
@@ -170,7 +170,7 @@ def _straights(
             found.append(((2 * cell[0], 2 * cell[1]), length + 0.5, True))
         step = (2 if straight else 1) if not _is_middle(place) else 1
         place = place[0] + step * down, place[1] + step * right
-        length += step * (0.5 if straight else sqrt(0.5) )
+        length += step * (0.5 if straight else sqrt(0.5))
         if not _is_opening(known, place, cell):
             return found
         found.append((place, length, False))
@@ -214,4 +214,4 @@ def _without_straights(points: NDArray[np.float64]) -> NDArray[np.float64]:
     pieces = np.diff(points, axis=0)
     headings = pieces / np.linalg.norm(pieces, axis=1, keepdims=True)
     turns = np.abs(np.diff(headings, axis=0)).max(axis=1) > 1e-9
-    return points[np.concatenate([[True], turns, [True]])]
+    return np.asarray(points[np.concatenate([[True], turns, [True]])])
