@@ -26,15 +26,13 @@ def spread_to_four(free, goal, until, distance):
     queue[0, 0], queue[0, 1] = goal[0], goal[1]
     distance[goal[0], goal[1]] = 0.0
     head, tail = 0, 1
-    last = np.inf
+    last = 0.0 if goal[0] == until[0] and goal[1] == until[1] else np.inf
     while head < tail:
         row, column = queue[head]
         head += 1
         d = distance[row, column]
         if d >= last:
             break
-        if row == until[0] and column == until[1]:
-            last = d
         for side in range(4):
             down = (side == 0) - (side == 1)
             right = (side == 2) - (side == 3)
@@ -43,6 +41,8 @@ def spread_to_four(free, goal, until, distance):
                 distance[r, c] = d + 1.0
                 queue[tail, 0], queue[tail, 1] = r, c
                 tail += 1
+                if r == until[0] and c == until[1]:
+                    last = d + 1.0
 
 
 @njit(cache=True)

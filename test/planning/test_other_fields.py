@@ -30,7 +30,9 @@ def solved(free: NDArray[np.bool_], goal: tuple[int, int], neighbours: int) -> N
                 ends.append(r * columns + c)
                 lengths.append(np.hypot(down, right))
     graph = coo_array((lengths, (begins, ends)), shape=(free.size, free.size))
-    return np.asarray(dijkstra(graph, directed=False, indices=goal[0] * columns + goal[1])).reshape(free.shape)
+    return np.asarray(dijkstra(graph, directed=False, indices=goal[0] * columns + goal[1])).reshape(
+        free.shape
+    )
 
 
 @pytest.mark.parametrize("neighbours", [4, 8])
