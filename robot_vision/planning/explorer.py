@@ -49,7 +49,6 @@ class MazeExplorer:
 
     def __init__(self, maze: Maze, heading: int = 0) -> None:
         self._maze = maze
-        self._upright, self._across = maze.upright, maze.across
         self._heading = heading
 
     def explore(self) -> Exploration:
@@ -61,7 +60,7 @@ class MazeExplorer:
         maze = self._maze
         known = KnownMaze(maze.size, maze.start, maze.goals)
         cell, heading, track = maze.start, self._heading, [maze.start]
-        self._look(known, cell)
+        look_around(maze, known, cell)
         to_goal: int | None = 0 if cell in maze.goals else None
         to_proof: int | None = None
         while True:
@@ -80,18 +79,20 @@ class MazeExplorer:
                 raise NoWayError(f"no way leads from the start {maze.start} to a goal of the maze")
             heading, cell = direction, beside(cell, direction)
             track.append(cell)
-            self._look(known, cell)
+            look_around(maze, known, cell)
             if to_goal is None and cell in maze.goals:
                 to_goal = len(track) - 1
         return Exploration(to_goal, to_proof, len(track) - 1, known.shortest_path(), track, known.as_maze())
 
-    def _look(self, known: KnownMaze, cell: Cell) -> None:
-        row, column = cell
-        walls = (
-            self._across[row + 1, column],
-            self._upright[row, column + 1],
-            self._across[row, column],
-            self._upright[row, column],
-        )
-        for direction in range(len(DIRECTIONS)):
-            known.see(cell, direction, bool(walls[direction]))
+
+def look_around(maze: Maze, known: KnownMaze, cell: Cell) -> None:
+    """Note the walls around a cell of a maze, as a mouse in it sees them."""
+    row, column = cell
+    walls = (
+        maze.walls_north[row, column],
+        maze.walls_east[row, column],
+        row == 0 or maze.walls_north[row - 1, column],
+        column == 0 or maze.walls_east[row, column - 1],
+    )
+    for direction in range(len(DIRECTIONS)):
+        known.see(cell, direction, bool(walls[direction]))

@@ -67,9 +67,10 @@ def test_ways_are_as_long_as_the_field_says_and_keep_out_of_walls() -> None:
         goal, robot = random_cell(random, free), random_cell(random, free)
         field = exact_field(free, goal)
         if np.isinf(field.distance[robot]):
-            for plan in (lambda: field.way_from(robot), lambda: shortest_way(free, robot, goal)):
-                with pytest.raises(NoWayError, match="no way leads"):
-                    plan()
+            with pytest.raises(NoWayError, match="no way leads"):
+                field.way_from(robot)
+            with pytest.raises(NoWayError, match="no way leads"):
+                shortest_way(free, robot, goal)
             continue
         for way in (field.way_from(robot), shortest_way(free, robot, goal)):
             assert tuple(way[0]) == robot
