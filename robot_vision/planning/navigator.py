@@ -81,6 +81,7 @@ class Navigator:
         self._given_up = np.zeros((0, 0), np.bool_)
         self._route = Route(_NOWHERE, 0.0, "no map yet")
         self._stale = True
+        self._planned_at = (0.0, 0.0)
 
     @property
     def mode(self) -> Mode:
@@ -130,12 +131,13 @@ class Navigator:
         if self._map is not None and self._mode == "explore" and len(self._route.points) and not self._stale:
             self._leave_behind(x, y)
         if self._stale or self._strays(x, y):
-            number = self._route.number + 1
+            self._stale, self._planned_at = False, (x, y)
+            before = self._route
             try:
-                points, seen, reason = self._planned(x, y)
-                self._route = Route(points, seen, reason, "", number)
-                self._stale = False
+                self._route = Route(*self._planned(x, y), "", before.number + 1)
             except PlanningError as why:
+                same = not len(before.points) and before.reason == str(why)
+                number = before.number + (not same)
                 self._route = Route(_NOWHERE, 0.0, str(why), _advice(why), number)
         return self._route
 
@@ -231,7 +233,10 @@ class Navigator:
 
     def _strays(self, x: float, y: float) -> bool:
         points = self._route.points
-        return len(points) > 0 and distance_to_line(points, (x, y)) > self.astray
+        if len(points):
+            return distance_to_line(points, (x, y)) > self.astray
+        moved = np.hypot(x - self._planned_at[0], y - self._planned_at[1])
+        return self._map is not None and bool(moved > self._map.resolution)
 
     def _blocks(self, lost: NDArray[np.bool_]) -> bool:
         if not len(self._route.points):
