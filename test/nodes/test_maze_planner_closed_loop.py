@@ -32,7 +32,7 @@ FRAME = "corridor"
 
 
 def test_the_nodes_drive_through_a_maze_without_touching_a_wall(tmp_path: Path) -> None:
-    maze, cell = grown(3, 3, 0.0, 2), 1.0
+    maze, cell = grown(3, 3, 0.0, 0), 1.0
     file = tmp_path / "small.maze"
     maze.write(file)
     with Graph() as graph:
