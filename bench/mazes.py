@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contest mazes explored by a mouse that has never seen them, beside the rule of most mice; and the runs that follow."""
+"""Contest mazes explored by a mouse that has never seen them, beside the rule of most mice; and the runs after that."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run(quick: bool) -> list[Table]:
         except NoWayError:
             unreachable += 1
             continue
-        found["wrong"].append(len(told.shortest_path) - 1 != steps_to_goal(known)[maze.start])
+        found["wrong"].append(len(told.shortest_path) - 1 != int(steps_to_goal(known)[maze.start]))
         goal, plain = flood_fill(maze)
         _, proof = flood_fill(maze, optimistic_proof=True)
         found["goal"].append(told.steps_to_goal / goal)

@@ -56,11 +56,11 @@ def _measured(free: NDArray[np.bool_], problems: list[Problem]) -> list[Cell]:
         began = time.process_time()
         way = plan_path(free, problem.start, problem.goal)
         milliseconds.append(1e3 * (time.process_time() - began))
-        exact = distance_field(free, problem.goal)[problem.start]
+        exact = float(distance_field(free, problem.goal)[problem.start])
         ratios.append(float(np.hypot(*np.diff(way, axis=0).T).sum()) / exact)
         undrivable += not is_drivable(free, way)
         eight = connected_field(free, problem.goal, 8, until=problem.start)[problem.start]
-        octile.append(abs(eight - problem.octile) <= _PRINTED * problem.octile)
+        octile.append(bool(abs(eight - problem.octile) <= _PRINTED * problem.octile))
         over.append(problem.octile / exact)
     return [
         Cell(len(problems)),
