@@ -72,6 +72,7 @@ class MazePlannerNode(VisionNode):
         self._header: Header | None = None
         self._drives = False
         self._told = -1
+        self._map_is_new = False
         self._path = self.say(Path, "path", LASTING)
         self._field = self.say(Image, "distance_field", LASTING)
         self._steering = self.say(TwistStamped, "steering", qos.ANSWER)
@@ -127,6 +128,7 @@ class MazePlannerNode(VisionNode):
         floor = maps.floor_map_from_message(message)
         self._navigator.see_map(floor)
         self._frame = message.header.frame_id
+        self._map_is_new = True
 
     def _hear_goal(self, message: PoseStamped) -> None:
         goal = maps.goal_from_message(message)
@@ -171,16 +173,18 @@ class MazePlannerNode(VisionNode):
             )
 
     def _tell(self, route: Route, header: Header) -> None:
-        """Publish a way that is new, and the distance function it descends, if somebody hears it."""
-        if route.number == self._told:
-            return
-        self._told = route.number
-        self._path.publish(messages.path_to_message(header, route.points, self._frame or header.frame_id))
-        if self._field.get_subscription_count():
+        """Publish a new way, and the distance function it descends if it or the map is new and somebody hears it."""
+        is_new = route.number != self._told
+        if is_new:
+            self._told = route.number
+            frame = self._frame or header.frame_id
+            self._path.publish(messages.path_to_message(header, route.points, frame))
+        if (is_new or self._map_is_new) and self._field.get_subscription_count():
             field = self._navigator.field()
             if field is not None:
                 own = Header(stamp=header.stamp, frame_id=self._frame)
                 self._field.publish(maps.field_to_message(own, field))
+        self._map_is_new = False
 
     def _stop_after_silence(self) -> None:
         self._watch.cancel()
