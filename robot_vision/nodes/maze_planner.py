@@ -46,9 +46,13 @@ DRIVE_SETTINGS = (
     Setting("turn_on_spot", 0.7, "angle to the way from which the robot turns standing, rad", 0.05, 3.1),
     Setting("latency", 0.1, "from a place told to the robot moving as told, s", 0.001, 2.0),
 )
-#: The map is kept by who says it, for those who come later.
+#: What holds until it is said anew is kept by who says it, for those who come later.
 LASTING = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+#: A bad map must not push out the good one before it.
+MAPS = QoSProfile(
+    depth=5, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
 
@@ -76,8 +80,8 @@ class MazePlannerNode(VisionNode):
         self._path = self.say(Path, "path", LASTING)
         self._field = self.say(Image, "distance_field", LASTING)
         self._steering = self.say(TwistStamped, "steering", qos.ANSWER)
-        self._maps = self.hear(OccupancyGrid, "map", self._hear_map, LASTING, required=True)
-        self._goals = self.hear(PoseStamped, "goal_pose", self._hear_goal, qos.NEWEST)
+        self._maps = self.hear(OccupancyGrid, "map", self._hear_map, MAPS, required=True)
+        self._goals = self.hear(PoseStamped, "goal_pose", self._hear_goal, qos.EVERY)
         self.hear(Odometry, "odom", self._hear_odometry, qos.SENSOR, required=True, picture=True)
         for mode in MODES:
             self.create_service(Trigger, mode, self._mode_service(mode))
@@ -162,6 +166,10 @@ class MazePlannerNode(VisionNode):
         )
         self._say(steering.speed, steering.turn_rate)
         self.answered(message.header.stamp, began)
+        if steering.speed == 0.0 and steering.turn_rate == 0.0 and route.reason:
+            advice = "let the map grow, or give another goal"
+            self.diagnostics.report(Level.WARN, f"stands still: the way {route.reason}", advice)
+            return
         self.diagnostics.report(Level.OK, route.reason or "drives")
 
     def _check_frame(self, header: Header) -> None:

@@ -296,6 +296,18 @@ def test_modes_are_changed_by_services(bench: NodeBench) -> None:
     says(bench, "leads over floor nobody has seen yet")
 
 
+def test_it_stands_where_the_known_floor_ends_and_goes_on_when_the_map_grows(bench: NodeBench) -> None:
+    half = room()
+    half[:, 30:] = -1
+    see(bench, half)
+    aim(bench, 5.05, 1.05)
+    assert not is_still(stand(bench, 1.05, 1.05))
+    assert is_still(stand(bench, 2.99, 1.05))
+    says(bench, "stands still: the way leads over floor nobody has seen yet")
+    see(bench, room())
+    assert not is_still(stand(bench, 2.99, 1.05))
+
+
 def test_disabled_it_stands_and_enabled_it_goes_on(bench: NodeBench) -> None:
     see(bench, room())
     aim(bench, 5.05, 1.05)
