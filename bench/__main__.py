@@ -25,6 +25,10 @@ BENCHMARKS = {
     "centres": "true centres of holes on rendered plates",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "latency": "from picture to steering at 30 Hz, processes over DDS",
+    "paths": "ways planned on the maps of MovingAI",
+    "fields": "speed, memory and growth of the distance function",
+    "mazes": "contest mazes explored, beside flood fill",
+    "maze_drives": "contest mazes driven by their true plan",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",
 }
 OUTPUT = ROOT / "out" / "bench.json"

@@ -191,6 +191,7 @@ def warm_steps() -> list[tuple[str, Callable[[], None]]]:
     return [
         ("lines", _find_lines),
         ("vanishing points", _find_vanishing_points),
+        ("planning", _plan),
     ]
 
 
@@ -204,3 +205,9 @@ def _find_vanishing_points() -> None:
     from robot_vision.perception import VanishingPointEstimator
 
     VanishingPointEstimator().warm_up()
+
+
+def _plan() -> None:
+    from robot_vision.planning.path import warm_up
+
+    warm_up()

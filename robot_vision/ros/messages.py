@@ -222,10 +222,10 @@ def straight_path(header: Header, lane: LaneHeading, length: float, step: float 
     return path_to_message(header, np.column_stack([x, y]))
 
 
-def path_to_message(header: Header, points: ArrayLike) -> Path:
-    """Build a Path in base_link through (N, 2) points (m), each turned towards the next."""
-    xy = np.asarray(points, np.float64)
-    own = Header(stamp=header.stamp, frame_id="base_link")
+def path_to_message(header: Header, points: ArrayLike, frame: str = "base_link") -> Path:
+    """Build a Path in a frame through (N, 2) points (m), each turned towards the next."""
+    xy = np.asarray(points, np.float64).reshape(-1, 2)
+    own = Header(stamp=header.stamp, frame_id=frame)
     along = np.diff(xy, axis=0, append=xy[-1:] + (xy[-1:] - xy[-2:-1]))
     message = Path(header=own)
     for (x, y), (dx, dy) in zip(xy.tolist(), along.tolist(), strict=True):
