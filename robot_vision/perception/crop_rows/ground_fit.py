@@ -39,10 +39,14 @@ _SCHEDULE = (
 _LEAST_FALL = 0.06
 #: Fewer bits than this say nothing.
 _FEWEST = 12
+_LEAST_YIELD = 0.3
 #: Length of row that counts as one clump, m.
 _CLUMP_M = 0.35
 #: Standard deviation of a plant about the line of its row, m.
-_SCATTER = 0.03
+_SCATTER = 0.02
+#: Factor on the variance, for what leans all plants one way: wind, the sun, the slope; of what grows, and of the bare
+#: ground between, whose borders are the leaves of tall plants.
+_DOUBT = {0.0: 2.0, 0.5: 3.0}
 #: Of the middle of a clump, m: no field is sown better.
 _LEAST_SCATTER = 0.008
 
@@ -70,15 +74,17 @@ class RowsOnGround:
 
 @dataclass(frozen=True)
 class Pieces:
-    """Bits of vegetation.
+    """Bits of vegetation, or of the bare ground between.
 
     Attributes:
         rays: (N, 3) in base_link, unit, for a body that does not lean.
-        weight: (N,) m^2 of ground that the vegetation of a bit covers.
+        weight: (N,) m^2 of ground that a bit covers.
+        aside: where bits gather, in spacings from a row: 0 for what grows, 0.5 for bare ground.
     """
 
     rays: Array
     weight: Array
+    aside: float = 0.0
 
     def __len__(self) -> int:
         return len(self.weight)
@@ -90,6 +96,9 @@ class Curvature:
 
     mean: float = 0.0
     sigma: float = 0.015
+
+
+_ANY_CURVATURE = Curvature(0.0, 0.1)
 
 
 @dataclass(frozen=True)
@@ -108,8 +117,8 @@ class GroundFit:
     """
 
     lean: float = float(np.deg2rad(1.5))
-    narrow: float = 0.1
-    far: float = 6.0
+    narrow: float = 0.12
+    far: float = 8.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -138,16 +147,18 @@ class GroundFit:
         values = np.array(start, np.float64)
         last = len(_SCHEDULE) - 1
         for number, (scale, far, aside) in enumerate(_SCHEDULE):
-            known = curvature if number < last - 1 else Curvature()
+            known = curvature if number < last - 1 else _ANY_CURVATURE
             information, prior = self._prior(known, tall)
             scale *= self.narrow * spacing
             here = self._in_view(pieces, camera, values, far * self.far, aside * self.far)
             if here is None:
                 return None
-            residual, jacobian = _residuals(here.rays, camera, values, spacing)
+            residual, jacobian = _residuals(here, camera, values, spacing)
             trust = _trust(here.weight, residual, scale)
+            # Plants as wide as the scale pull less than they say, as one side of them pulls against the other
+            yields = float(np.clip(1.0 - trust @ (residual / scale) ** 2 / trust.sum(), _LEAST_YIELD, 1.0))
             hessian = jacobian.T @ (trust[:, None] * jacobian) + information
-            gradient = jacobian.T @ (trust * residual) + information @ (values - prior)
+            gradient = jacobian.T @ (trust * residual) / yields + information @ (values - prior)
             values = values - np.linalg.solve(hessian, gradient)
         return self._judged(pieces, camera, values, spacing, tall)
 
@@ -163,7 +174,7 @@ class GroundFit:
         seen = (x - camera.x_m > 0.0) & (x - camera.x_m < far) & (np.abs(y) < aside)
         if int(seen.sum()) < _FEWEST:
             return None
-        return Pieces(pieces.rays[seen], pieces.weight[seen])
+        return Pieces(pieces.rays[seen], pieces.weight[seen], pieces.aside)
 
     def _judged(
         self, pieces: Pieces, camera: Camera, values: Array, spacing: float, tall: tuple[float, float]
@@ -172,7 +183,7 @@ class GroundFit:
         here = self._in_view(pieces, camera, values, self.far, 0.6 * self.far)
         if here is None:
             return None
-        residual, jacobian = _residuals(here.rays, camera, values, spacing)
+        residual, jacobian = _residuals(here, camera, values, spacing)
         scale = self.narrow * spacing
         trust = _trust(here.weight, residual, scale)
         x, y = ground_places(here.rays, camera, values)
@@ -185,19 +196,20 @@ class GroundFit:
         scatter = float(np.average(middle**2, weights=amount)) + _LEAST_SCATTER**2
         clumps = float(amount.sum() ** 2 / (amount**2).sum())
         honest = clumps / scatter / float(trust.sum())
-        information = honest * (jacobian.T @ (trust[:, None] * jacobian)) + self._prior(Curvature(), tall)[0]
-        covariance = np.linalg.inv(information)
+        information = honest * (jacobian.T @ (trust[:, None] * jacobian)) + self._prior(_ANY_CURVATURE, tall)[0]
+        covariance = _DOUBT[here.aside] * np.linalg.inv(information)
         share = float(np.average(np.cos(2.0 * np.pi * residual / spacing), weights=here.weight))
         return RowsOnGround(values, 0.5 * (covariance + covariance.T), spacing, share, count)
 
 
-def pieces_of(mask: NDArray[np.bool_], camera: Camera, cell: int) -> Pieces:
-    """Cut a mask (H, W) of vegetation into cells, with the ground that the vegetation in each covers.
+def pieces_of(mask: NDArray[np.bool_], camera: Camera, cell: int, aside: float = 0.0) -> Pieces:
+    """Cut a mask (H, W) of vegetation, or of bare ground, into cells, with the ground that each covers.
 
     Args:
-        mask: of vegetation.
+        mask: of what counts.
         camera: rectified, of the mask's size, with its height.
         cell: side of a cell, px.
+        aside: as in `Pieces`.
     """
     height, width = (side // cell * cell for side in mask.shape)
     filled = mask[:height, :width].reshape(height // cell, cell, width // cell, cell)
@@ -217,7 +229,7 @@ def pieces_of(mask: NDArray[np.bool_], camera: Camera, cell: int) -> Pieces:
     assert camera.height_m is not None
     axis = rays @ camera.optical_to_base[:, 2]
     cone = axis**3 / (camera.fx * camera.fy)
-    return Pieces(rays, amount * cone * camera.height_m**2 / fall**3)
+    return Pieces(rays, amount * cone * camera.height_m**2 / fall**3, aside)
 
 
 def ground_places(rays: Array, camera: Camera, values: Array) -> tuple[Array, Array]:
@@ -234,19 +246,20 @@ def lateral(x: Array, y: Array, values: Array) -> tuple[Array, Array]:
     along = cosine * x - sine * y
     left = values[OFFSET] + sine * x + cosine * y
     bend = values[CURVATURE]
-    # The distance to a circle of radius 1 / bend, to second order; its neighbours are concentric
-    return left - 0.5 * bend * along**2 / np.maximum(1.0 - bend * left, 0.2), along
+    # The distance to a circle of radius 1 / bend, in a form that bears a bend of 0; its neighbours are concentric
+    reach = np.hypot(1.0 - bend * left, bend * along)
+    return (2.0 * left - bend * (left**2 + along**2)) / (1.0 + reach), along
 
 
-def _residuals(rays: Array, camera: Camera, values: Array, spacing: float) -> tuple[Array, Array]:
-    """Distance (N,) of each bit from the row nearest to it, m, and its derivatives (N, 6)."""
-    left = lateral(*ground_places(rays, camera, values), values)[0]
-    residual = left - spacing * np.round(left / spacing)
-    jacobian = np.empty((len(rays), 6))
+def _residuals(pieces: Pieces, camera: Camera, values: Array, spacing: float) -> tuple[Array, Array]:
+    """Distance (N,) of each bit from the nearest place of its kind, m, and its derivatives (N, 6)."""
+    left = lateral(*ground_places(pieces.rays, camera, values), values)[0]
+    residual = left - spacing * (np.round(left / spacing - pieces.aside) + pieces.aside)
+    jacobian = np.empty((len(pieces), 6))
     for k in range(6):
         moved = values.copy()
         moved[k] += _STEPS[k]
-        jacobian[:, k] = (lateral(*ground_places(rays, camera, moved), moved)[0] - left) / _STEPS[k]
+        jacobian[:, k] = (lateral(*ground_places(pieces.rays, camera, moved), moved)[0] - left) / _STEPS[k]
     return residual, jacobian
 
 

@@ -54,11 +54,11 @@ class RowFilter:
         ValueError: naming the setting that makes no sense.
     """
 
-    shared: float = 0.8
-    view: float = 2.5
-    sidestep: float = 0.003
-    turn: float = 0.004
-    bend: float = 0.0008
+    shared: float = 0.6
+    view: float = 1.2
+    sidestep: float = 0.0025
+    turn: float = 0.003
+    bend: float = 0.0003
     turned: float = float(np.deg2rad(0.3))
     gate: float = 21.0
     _filter: KalmanFilter | None = field(default=None, init=False, repr=False, compare=False)

@@ -24,7 +24,7 @@ from robot_vision.perception.crop_rows.ground_fit import (
     nearest_row,
     pieces_of,
 )
-from robot_vision.perception.crop_rows.row_extent import RowExtent, row_cover
+from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, row_cover
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 from robot_vision.perception.crop_rows.sight import fault_of
 from robot_vision.perception.lane import LaneHeading
@@ -33,6 +33,8 @@ from robot_vision.perception.vegetation import Picture, VegetationMask
 Array = NDArray[np.float64]
 
 _CELL_PX = 8
+#: Share of the ground covered from which on the bare ground between the rows is the rarer and tells more.
+_CLOSED = 0.4
 #: Height and spacing contradict each other beyond this share: one of them is not what was given.
 _CONTRADICTION = 0.1
 #: After so many pictures in a row that fit no row the search begins anew.
@@ -125,8 +127,14 @@ class RowTracker:
         fault = fault_of(picture)
         if fault:
             return self._without(fault)
-        pieces = pieces_of(self.mask.of(picture), camera, _CELL_PX * max(1, picture.shape[1] // 640))
-        rows, fault = self._fitted(picture, pieces, camera)
+        mask = self.mask.of(picture)
+        cell = _CELL_PX * max(1, picture.shape[1] // 640)
+        pieces = pieces_of(mask, camera, cell)
+        covered = self._covered(pieces, camera)
+        told = pieces if covered < _CLOSED else pieces_of(~mask, camera, cell, 0.5)
+        if self.row_filter.knows:
+            told = self._before_the_end(told, camera)
+        rows, fault = self._fitted(picture, told, covered, camera)
         if rows is None:
             if self.row_filter.knows:
                 self._look_along(pieces, camera, self._start(), motion)
@@ -145,13 +153,29 @@ class RowTracker:
         """What a picture should show, (6,): as predicted, the body upright."""
         return np.array([*self.row_filter.expected(), 0.0, 0.0, -0.02])
 
+    def _before_the_end(self, pieces: Pieces, camera: Camera) -> Pieces:
+        """Leave out what grows where the rows are known to be over: weeds, and the grass of the headland."""
+        end = self.extent.end(self._way)
+        if end is None:
+            return pieces
+        x, _ = ground_places(pieces.rays, camera, self._start())
+        here = x < end + CELL_M
+        return Pieces(pieces.rays[here], pieces.weight[here], pieces.aside)
+
+    def _covered(self, pieces: Pieces, camera: Camera) -> float:
+        """Share of the ground that plants cover, straight before the robot."""
+        upright = np.zeros(6)
+        x, y = ground_places(pieces.rays, camera, upright)
+        near, far = ground_in_view(camera, upright)
+        far = min(far, 0.5 * self.fit.far)
+        half = _SIDE_ROWS * self.spacing
+        here = (x > near) & (x < far) & (np.abs(y) < half)
+        return float(pieces.weight[here].sum()) / max(2.0 * half * (far - near), 1e-6)
+
     def _fitted(
-        self, picture: Picture, pieces: Pieces, camera: Camera
+        self, picture: Picture, pieces: Pieces, covered: float, camera: Camera
     ) -> tuple[RowsOnGround | None, str]:
         """Rows of this picture alone, or the reason why there are none."""
-        assert camera.height_m is not None
-        ground = float(np.pi * self.fit.far**2 / 4.0)
-        covered = float(pieces.weight[_near(pieces, camera, self.fit.far)].sum()) / ground
         if covered < self.cover:
             return None, "hardly anything grows in this picture"
         if self.row_filter.knows:
@@ -251,12 +275,6 @@ def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
     x, _ = ground_places(rays, camera, values)
     far = float(x[1]) if 0.0 < x[1] < 100.0 else 100.0
     return float(x[0]), far
-
-
-def _near(pieces: Pieces, camera: Camera, far: float) -> NDArray[np.bool_]:
-    assert camera.height_m is not None
-    reach = camera.height_m / np.maximum(-pieces.rays[:, 2], 1e-3)
-    return np.asarray(np.hypot(reach * pieces.rays[:, 0], reach * pieces.rays[:, 1]) < far)
 
 
 def _tall(covered: float) -> tuple[float, float]:
