@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 _CELL_PX = 8
 #: Share of the ground covered from which on the bare ground between the rows is the rarer and tells more.
 _CLOSED = 0.4
+#: Length of a stretch of way (m), the farthest one, and the share of it that must be grown over to be of use.
+_STRETCH_M, _FARTHEST_M, _GROWN = 0.5, 40.0, 0.4
 #: Height and spacing contradict each other beyond this share: one of them is not what was given.
 _CONTRADICTION = 0.1
 #: After so many pictures in a row that fit no row the search begins anew.
@@ -131,7 +133,7 @@ class RowTracker:
         cell = _CELL_PX * max(1, picture.shape[1] // 640)
         pieces = pieces_of(mask, camera, cell)
         covered = self._covered(pieces, camera)
-        told = pieces if covered < _CLOSED else pieces_of(~mask, camera, cell, 0.5)
+        told = pieces if covered < _CLOSED else between_plants(pieces_of(~mask, camera, cell, 0.5), pieces, camera)
         if self.row_filter.knows:
             told = self._before_the_end(told, camera)
         rows, fault = self._fitted(picture, told, covered, camera)
@@ -266,6 +268,20 @@ class RowTracker:
 
     def _in_gap(self, end: float | None) -> bool:
         return end is not None
+
+
+def between_plants(bare: Pieces, plants: Pieces, camera: Camera) -> Pieces:
+    """The bits of bare ground in stretches of the way where plants stand: not those of gaps and the headland."""
+    upright = np.zeros(6)
+    ahead = [np.clip(ground_places(bits.rays, camera, upright)[0], 0.0, _FARTHEST_M) for bits in (bare, plants)]
+    stretch = [(x / _STRETCH_M).astype(np.int64) for x in ahead]
+    count = int(_FARTHEST_M / _STRETCH_M) + 1
+    open_area, grown = (
+        np.bincount(place, bits.weight, count)
+        for place, bits in zip(stretch, (bare, plants), strict=True)
+    )
+    kept = (grown > _GROWN * (open_area + grown))[stretch[0]]
+    return Pieces(bare.rays[kept], bare.weight[kept], bare.aside)
 
 
 def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
