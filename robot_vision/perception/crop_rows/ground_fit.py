@@ -126,7 +126,13 @@ class GroundFit:
                 raise ValueError(f"{name} must be a positive number, not {value}")
 
     def fit(
-        self, pieces: Pieces, camera: Camera, spacing: float, start: Array, curvature: Curvature, tall: tuple[float, float]
+        self,
+        pieces: Pieces,
+        camera: Camera,
+        spacing: float,
+        start: Array,
+        curvature: Curvature,
+        tall: tuple[float, float],
     ) -> RowsOnGround | None:
         """Fit rows from a start that is right to a third of a spacing at the robot's feet.
 
@@ -196,7 +202,9 @@ class GroundFit:
         scatter = float(np.average(middle**2, weights=amount)) + _LEAST_SCATTER**2
         clumps = float(amount.sum() ** 2 / (amount**2).sum())
         honest = clumps / scatter / float(trust.sum())
-        information = honest * (jacobian.T @ (trust[:, None] * jacobian)) + self._prior(_ANY_CURVATURE, tall)[0]
+        information = (
+            honest * (jacobian.T @ (trust[:, None] * jacobian)) + self._prior(_ANY_CURVATURE, tall)[0]
+        )
         covariance = _DOUBT[here.aside] * np.linalg.inv(information)
         share = float(np.average(np.cos(2.0 * np.pi * residual / spacing), weights=here.weight))
         return RowsOnGround(values, 0.5 * (covariance + covariance.T), spacing, share, count)

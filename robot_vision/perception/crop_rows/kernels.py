@@ -197,9 +197,7 @@ def settle(
     sums_real = np.empty((harmonics, len(bends), columns), np.float32)
     sums_imaginary = np.empty((harmonics, len(bends), columns), np.float32)
     for m in range(harmonics):
-        turn_pools(
-            real, imaginary, density, pools, m, first, step, bends, sums_real[m], sums_imaginary[m]
-        )
+        turn_pools(real, imaginary, density, pools, m, first, step, bends, sums_real[m], sums_imaginary[m])
     turns = np.empty((offsets, harmonics, 2), np.float32)
     for t in range(offsets):
         for m in range(harmonics):

@@ -161,7 +161,7 @@ class RowFilter:
         f.P[:3, :3] = covariance
         f.P[TURNED, TURNED] = self.turned**2 + 1e-12
         f.P[YAW, YAW] += self.turned**2
-        f.P[YAW, TURNED] = f.P[TURNED, YAW] = -self.turned**2
+        f.P[YAW, TURNED] = f.P[TURNED, YAW] = -(self.turned**2)
         f.P[_COMMON, _COMMON] = self.shared * covariance
         f.P[:3, _COMMON] = f.P[_COMMON, :3] = -self.shared * covariance
         self._filter = f

@@ -101,9 +101,7 @@ class RowTracer:
         shape = (bands, self.stretches, 2 * self.drift + 1, _PHASES)
         if self._totals.shape != shape:
             self._totals = np.empty(shape, np.float32)
-        accumulate(
-            scores, turn, self.drift_cost * turn, np.float32(self.stretch_cost), self._totals
-        )
+        accumulate(scores, turn, self.drift_cost * turn, np.float32(self.stretch_cost), self._totals)
         path = np.empty((bands, 2), np.int64)
         total = recall(self._totals, turn, np.float32(self.stretch_cost), path)
         lag = path[:, 1] - _PHASES // 2

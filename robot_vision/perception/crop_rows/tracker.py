@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from robot_vision.perception.crop_rows.detector import CropRowDetector
 from robot_vision.perception.crop_rows.ground_fit import (
     HEIGHT,
     OFFSET,
-    PITCH,
     YAW,
     Curvature,
     GroundFit,
@@ -39,7 +38,7 @@ _CLOSED = 0.4
 _STRETCH_M, _FARTHEST_M, _GROWN = 0.5, 40.0, 0.4
 #: Height and spacing contradict each other beyond this share: one of them is not what was given.
 _CONTRADICTION = 0.1
-#: After so many pictures in a row that fit no row the search begins anew.
+#: Without odometry, after so many pictures in a row that fit no row the search begins anew.
 _MOST_REFUSED = 8
 #: Standard deviation of the offset, in spacings, beyond which nobody knows which row this is.
 _LOST = 0.2
@@ -94,7 +93,8 @@ class RowTracker:
     cover: float = 0.004
     _way: float = field(default=0.0, init=False, repr=False, compare=False)
     _refused: int = field(default=0, init=False, repr=False, compare=False)
-    _odometry: bool = field(default=True, init=False, repr=False, compare=False)
+    _unseen: float = field(default=0.0, init=False, repr=False, compare=False)
+    _blind: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.spacing) and self.spacing > 0.0):
@@ -107,7 +107,7 @@ class RowTracker:
         """Forget everything earlier pictures told."""
         self.row_filter.reset()
         self.extent.reset()
-        self._way = 0.0
+        self._way = self._unseen = 0.0
         self._refused = 0
 
     def update(self, picture: Picture, camera: Camera, motion: Motion) -> RowEstimate:
@@ -123,17 +123,26 @@ class RowTracker:
         """
         camera = camera.rectified()
         if camera.height_m is None or not camera.focal_known:
-            raise ValueError("rows in metres need a calibrated camera and its height (parameter camera.height)")
+            raise ValueError(
+                "rows in metres need a calibrated camera and its height (parameter camera.height)"
+            )
         self.row_filter.predict(motion)
+        self._blind = motion.speed is None
         self._way += (motion.speed or 0.0) * motion.seconds
+        self._unseen += abs(motion.speed or 0.0) * motion.seconds
         fault = fault_of(picture)
         if fault:
-            return self._without(fault)
+            # Odometry alone may carry on over ground that was looked at and is bare, not through the dark
+            return replace(self._without(fault), lane=None)
         mask = self.mask.of(picture)
         cell = _CELL_PX * max(1, picture.shape[1] // 640)
         pieces = pieces_of(mask, camera, cell)
         covered = self._covered(pieces, camera)
-        told = pieces if covered < _CLOSED else between_plants(pieces_of(~mask, camera, cell, 0.5), pieces, camera)
+        told = (
+            pieces
+            if covered < _CLOSED
+            else between_plants(pieces_of(~mask, camera, cell, 0.5), pieces, camera)
+        )
         if self.row_filter.knows:
             told = self._before_the_end(told, camera)
         rows, fault = self._fitted(picture, told, covered, camera)
@@ -148,6 +157,7 @@ class RowTracker:
             self._look_along(pieces, camera, self._start(), motion)
             return self._without("what stands in this picture does not go on from the rows before")
         self._refused = 0
+        self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, motion)
         return RowEstimate(self._lane(), "", True, rows, self.extent.end(self._way))
 
@@ -238,7 +248,9 @@ class RowTracker:
         aside, along = lateral(x, y, values)
         near, far = ground_in_view(camera, values)
         half = _SIDE_ROWS * self.spacing
-        stretch = row_cover(along, aside, pieces.weight, self.spacing, half, near, min(far, 1.4 * self.fit.far))
+        stretch = row_cover(
+            along, aside, pieces.weight, self.spacing, half, near, min(far, 1.4 * self.fit.far)
+        )
         self.extent.see(self._way, *stretch)
 
     def _lane(self) -> LaneHeading | None:
@@ -255,30 +267,29 @@ class RowTracker:
         )
 
     def _without(self, reason: str) -> RowEstimate:
-        """The answer to a picture that shows no rows: odometry carries on for a while."""
-        self._refused += 1
+        """The answer to a picture that shows no rows: odometry carries on, as far as a gap may be long."""
         if not self.row_filter.knows:
             return RowEstimate(None, reason, False, None, None)
+        self._refused += 1
         end = self.extent.end(self._way)
         lane = self._lane()
-        if lane is None or (self._refused > _MOST_REFUSED and not self._in_gap(end)):
+        lost = self._unseen > self.extent.gap or (self._blind and self._refused > _MOST_REFUSED)
+        if lane is None or lost:
             self.reset()
-            return RowEstimate(None, reason, False, None, end)
+            return RowEstimate(None, f"{reason}; the row is lost", False, None, end)
         return RowEstimate(lane, reason, False, None, end)
-
-    def _in_gap(self, end: float | None) -> bool:
-        return end is not None
 
 
 def between_plants(bare: Pieces, plants: Pieces, camera: Camera) -> Pieces:
     """The bits of bare ground in stretches of the way where plants stand: not those of gaps and the headland."""
     upright = np.zeros(6)
-    ahead = [np.clip(ground_places(bits.rays, camera, upright)[0], 0.0, _FARTHEST_M) for bits in (bare, plants)]
+    ahead = [
+        np.clip(ground_places(bits.rays, camera, upright)[0], 0.0, _FARTHEST_M) for bits in (bare, plants)
+    ]
     stretch = [(x / _STRETCH_M).astype(np.int64) for x in ahead]
     count = int(_FARTHEST_M / _STRETCH_M) + 1
     open_area, grown = (
-        np.bincount(place, bits.weight, count)
-        for place, bits in zip(stretch, (bare, plants), strict=True)
+        np.bincount(place, bits.weight, count) for place, bits in zip(stretch, (bare, plants), strict=True)
     )
     kept = (grown > _GROWN * (open_area + grown))[stretch[0]]
     return Pieces(bare.rays[kept], bare.weight[kept], bare.aside)
@@ -294,7 +305,7 @@ def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
 
 
 def _tall(covered: float) -> tuple[float, float]:
-    """How much plants that cover so much of the ground bring it nearer: mean and standard deviation, logarithm of height.
+    """How much plants that cover so much of the ground bring it nearer: mean and deviation of the logarithm of height.
 
     What covers the ground stands high: seedlings are flat, a canopy as high as its rows are apart.
     """
