@@ -16,8 +16,8 @@ INDICES: tuple[Index, ...] = ("auto", "green", "infrared")
 
 #: Grey levels added to the sum of the channels, so that the noise of dark pixels is no colour.
 _DARK = 30.0
-#: Grey level below which a channel is noise; at which it is saturated.
-_BLACK, _WHITE = 12, 250
+#: Grey level below which colour is noise.
+_BLACK = 16
 #: The index is cut into so many levels for Otsu's threshold.
 _LEVELS = 255.0
 
@@ -158,10 +158,14 @@ class VegetationMask:
             ValueError: the array is no such picture.
         """
         index = vegetation_index(picture, self.index, self.blur)
-        if picture.ndim == 2 or self.index == "infrared":
+        infrared = picture.ndim == 2 or self.index == "infrared"
+        if infrared:
             # soil reflects the near infrared as well; what grows is brighter than the rest
-            index = index - index.mean(dtype=np.float64).astype(np.float32)
+            index = index - np.float32(index.mean(dtype=np.float64))
         levels = cv2.convertScaleAbs(np.maximum(index, 0.0), alpha=_LEVELS)
+        if not infrared:
+            # where all channels are dark, colour is noise
+            levels[cv2.cvtColor(np.asarray(picture), cv2.COLOR_BGR2GRAY) < _BLACK] = 0
         threshold, _ = cv2.threshold(levels, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
         floor = self.floor * _LEVELS
         low = cv2.threshold(levels, max(self.lower * threshold, floor), 1, cv2.THRESH_BINARY)[1]

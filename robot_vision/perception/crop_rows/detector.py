@@ -3,19 +3,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
+from robot_vision.perception.crop_rows.ground_fit import Curvature, GroundFit, nearest_row, pieces_of
 from robot_vision.perception.crop_rows.pattern import RowPattern
-from robot_vision.perception.crop_rows.tracing import RowTracer, TracedRows
+from robot_vision.perception.crop_rows.recipe import ChapterRecipe
+from robot_vision.perception.crop_rows.start import start_on_ground
+from robot_vision.perception.crop_rows.tracing import RowTracer, TracedRows, straight
 from robot_vision.perception.crop_rows.votes import USUAL_WIDTH, RowVotes, StraightRows
-from robot_vision.perception.vegetation import Picture, VegetationWeight
+from robot_vision.perception.vegetation import Picture, VegetationMask, VegetationWeight
 
 Array = NDArray[np.float64]
+Method = Literal["traced", "straight", "plants"]
+METHODS: tuple[Method, ...] = ("traced", "straight", "plants")
 
 #: Smaller pictures hold no rows worth the name.
 SMALLEST = 32
@@ -24,6 +30,9 @@ _WIDEST = 400
 #: Votes of rows and of noise meet about here: the vote of scrambled real pictures reaches the first, that of hardly
 #: any real field is below the second.
 _NOISE, _SURE = 0.07, 0.25
+_CELL_PX = 8
+#: Mean and standard deviation of the logarithm of the height, for crop of any height.
+_ANY_HEIGHT = (-0.05, 0.08)
 #: Standard deviation of a row's place, spacings, and of the yaw, rad, in pictures without a calibrated camera.
 _PLACE_SIGMA, _YAW_SIGMA = 0.03, 0.02
 
@@ -33,11 +42,13 @@ class CropRowDetector:
     """Finds rows in a picture of which nothing need be known: neither horizon nor spacing.
 
     Soft vegetation weights, row spectra by which all plants vote for all rows at once, and dynamic programming that
-    follows the rows however they wind. `recipe.ChapterRecipe` is the textbook's way for comparison.
+    follows the rows however they wind.
 
     Args:
         camera: rectified, of the pictures' size; None: not known. It may lack its height.
         spacing: between rows on the ground, m; None: not known.
+        method: `traced` follows rows however they wind, `straight` leaves them as the votes have them, `plants` is the
+            textbook's way (`recipe.ChapterRecipe`): the centres of whole plants vote.
         weight: of vegetation.
         votes: for straight rows.
         tracer: that follows them.
@@ -49,12 +60,15 @@ class CropRowDetector:
 
     camera: Camera | None = None
     spacing: float | None = None
+    method: Method = "traced"
     weight: VegetationWeight = field(default_factory=VegetationWeight)
     votes: RowVotes = field(default_factory=RowVotes)
     tracer: RowTracer = field(default_factory=RowTracer)
     least_confidence: float = 0.1
 
     def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ValueError(f"method must be one of {', '.join(METHODS)}, not {self.method!r}")
         if self.spacing is not None and not (np.isfinite(self.spacing) and self.spacing > 0.0):
             raise ValueError(f"spacing must be a positive number of metres, not {self.spacing}")
         if not 0.0 <= self.least_confidence <= 1.0:
@@ -81,7 +95,10 @@ class CropRowDetector:
         confidence = float(np.clip((rows.votes - _NOISE) / (_SURE - _NOISE), 0.0, 1.0))
         if confidence <= self.least_confidence:
             return None
-        return self._pattern(rows, traced, confidence, height, width)
+        pattern = self._pattern(rows, traced, confidence, height, width)
+        if self.camera is None or pattern.unit == "px" or self.camera.height_m is None:
+            return pattern
+        return self._on_ground(bgr, pattern, self.camera.rectified())
 
     def find(
         self, bgr: Picture, horizon: float | None = None, spacing_at_bottom: float | None = None
@@ -93,33 +110,27 @@ class CropRowDetector:
         if scale > 1:
             size = width // scale, height // scale
             small = np.asarray(cv2.resize(bgr, size, interpolation=cv2.INTER_AREA))
-        weight = self.weight.of(small).weight
-        rows = self._straight(weight, height, scale, horizon, spacing_at_bottom)
-        traced = self.tracer.trace(weight, rows, self.votes.least * weight.shape[1] / USUAL_WIDTH)
-        return _enlarged(rows, traced, height, width, weight.shape)
+        spacing = None if spacing_at_bottom is None else spacing_at_bottom / scale
+        ratio = None if horizon is None else -horizon / (height - 1.0 - horizon)
+        width = small.shape[1]
+        least = self.votes.least * width / USUAL_WIDTH
+        if self.method == "plants":
+            rows = ChapterRecipe(votes=self.votes).find(small, spacing, ratio)
+            traced = straight(rows, small.shape[0], width, least)
+        else:
+            weight = self.weight.of(small).weight
+            rows = self.votes.search(self.votes.spectrum(weight), width, spacing, ratio)
+            if self.method == "traced":
+                traced = self.tracer.trace(weight, rows, least)
+            else:
+                traced = straight(rows, small.shape[0], width, least)
+        return _enlarged(rows, traced, bgr.shape[:2], small.shape[:2])
 
     def warm_up(self) -> None:
         """Load or compile the kernels, so that the first picture is not kept waiting."""
         stripes = np.zeros((64, 64, 3), np.uint8)
         stripes[:, ::8, 1] = 200
         CropRowDetector().find(stripes)
-
-    def _straight(
-        self,
-        weight: NDArray[np.float32],
-        height: int,
-        scale: int,
-        horizon: float | None,
-        spacing: float | None,
-    ) -> StraightRows:
-        width = weight.shape[1]
-        spectrum = self.votes.spectrum(weight)
-        return self.votes.search(
-            spectrum,
-            width,
-            None if spacing is None else spacing / scale,
-            None if horizon is None else -horizon / (height - 1.0 - horizon),
-        )
 
     def _pattern(
         self, rows: StraightRows, traced: TracedRows, confidence: float, height: int, width: int
@@ -141,6 +152,19 @@ class CropRowDetector:
             confidence,
             rows.horizon(height),
             unit,
+        )
+
+    def _on_ground(self, bgr: Picture, pattern: RowPattern, camera: Camera) -> RowPattern:
+        """The same rows with offset, yaw and curvature fitted on the ground, where plants enough are in view."""
+        pieces = pieces_of(VegetationMask(index=self.weight.index).of(bgr), camera, _CELL_PX)
+        start = start_on_ground(pattern, camera, pattern.spacing)
+        rows = GroundFit().fit(pieces, camera, pattern.spacing, start, Curvature(), _ANY_HEIGHT)
+        if rows is None:
+            return pattern
+        rows = nearest_row(rows, 0.0)
+        offset, yaw, curvature = rows.values[:3].tolist()
+        return replace(
+            pattern, offset=offset, yaw=yaw, curvature=curvature, covariance=rows.covariance[:3, :3]
         )
 
     def _in_space(
@@ -185,10 +209,11 @@ def _check_hints(horizon: float | None, spacing: float | None, height: int) -> N
 
 
 def _enlarged(
-    rows: StraightRows, traced: TracedRows, height: int, width: int, small: tuple[int, ...]
+    rows: StraightRows, traced: TracedRows, whole: tuple[int, ...], small: tuple[int, ...]
 ) -> tuple[StraightRows, TracedRows]:
     """Rows found in a smaller picture, in px of the whole one (edge on edge, as cv2.resize lays them)."""
-    if (height, width) == small[:2]:
+    height, width = whole
+    if whole == small:
         return rows, traced
     factor = width / small[1]
     places = (np.arange(height) + 0.5) * small[0] / height - 0.5
@@ -203,7 +228,5 @@ def _enlarged(
 
     spacing = factor * stretched(traced.spacing)
     centre = factor * (stretched(traced.centre) + 0.5) - 0.5
-    whole = StraightRows(
-        rows.spacing * factor, rows.ratio, rows.column * factor, rows.bend, rows.offset, rows.votes
-    )
-    return whole, TracedRows(centre, spacing, traced.score)
+    enlarged = replace(rows, spacing=rows.spacing * factor, column=rows.column * factor)
+    return enlarged, TracedRows(centre, spacing, traced.score)

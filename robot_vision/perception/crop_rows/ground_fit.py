@@ -40,6 +40,8 @@ _LEAST_FALL = 0.06
 #: Fewer bits than this say nothing.
 _FEWEST = 12
 _LEAST_YIELD = 0.3
+#: Standard deviation of offset (m) and yaw (rad) of a start.
+_PLACE, _START_SIGMAS = [0, 1], np.array([0.06, 0.02])
 #: Length of row that counts as one clump, m.
 _CLUMP_M = 0.35
 #: Standard deviation of a plant about the line of its row, m.
@@ -155,10 +157,14 @@ class GroundFit:
         for number, (scale, far, aside) in enumerate(_SCHEDULE):
             known = curvature if number < last - 1 else _ANY_CURVATURE
             information, prior = self._prior(known, tall)
+            if known is curvature:
+                # Weeds alone, as in a gap, must not lead astray what begins with the ground at the robot's feet
+                information[_PLACE, _PLACE] = _START_SIGMAS**-2.0
+                prior[_PLACE] = start[_PLACE]
             scale *= self.narrow * spacing
             here = self._in_view(pieces, camera, values, far * self.far, aside * self.far)
             if here is None:
-                return None
+                continue
             residual, jacobian = _residuals(here, camera, values, spacing)
             trust = _trust(here.weight, residual, scale)
             # Plants as wide as the scale pull less than they say, as one side of them pulls against the other
@@ -282,3 +288,11 @@ def nearest_row(rows: RowsOnGround, offset: float) -> RowsOnGround:
     values = rows.values.copy()
     values[OFFSET] += rows.spacing * np.round((offset - values[OFFSET]) / rows.spacing)
     return replace(rows, values=values)
+
+
+def tall_by_cover(covered: float) -> tuple[float, float]:
+    """How much plants that cover so much of the ground bring it nearer: mean and deviation of the logarithm of height.
+
+    What covers the ground stands high: seedlings are flat, a canopy as high as its rows are apart.
+    """
+    return -0.02 - 0.25 * max(covered - 0.15, 0.0), 0.03 + 0.08 * max(covered - 0.15, 0.0)

@@ -57,10 +57,8 @@ def pool(spectrum, bottom, ratio, least, step, most, harmonics, real, imaginary,
     The spacing runs linearly from `bottom` at the last image row to `bottom * ratio` at the first. Successive image
     rows whose densities (1 / spacing) differ by less than `step` are summed, at most `most` of them.
 
-    Args:
-        spectrum: packed rows of cv2.dft, (H, L).
-        real, imaginary: (G, harmonics) to be filled.
-        density: (G,) to be filled, mean rows a pixel of each pool.
+    `spectrum` holds packed rows of cv2.dft, (H, L); `real` and `imaginary` (G, harmonics) are filled, and `density`
+    (G,) with the mean rows a pixel of each pool.
 
     Returns:
         Number of pools filled.
@@ -107,11 +105,8 @@ def turn_pools(real, imaginary, density, pools, harmonic, first, step, bends, su
     The phase of a row at density s is  t + column (s - s_bottom) + bend (x^2 - x),  x = 0 at the bottom and 1 at the
     top: a straight row's phase is linear in its density.
 
-    Args:
-        harmonic: 0 for the fundamental.
-        first, step: vanishing columns, px from the middle of the picture.
-        bends: (A,) rows by which curved rows sway.
-        sum_real, sum_imaginary: (A, B) to be filled.
+    `harmonic` is 0 for the fundamental; `first` and `step` give the vanishing columns, px from the middle of the
+    picture, `bends` (A,) the rows by which curved rows sway; `sum_real` and `sum_imaginary` (A, B) are filled.
     """
     columns = sum_real.shape[1]
     sum_real[:] = 0.0
@@ -148,9 +143,7 @@ def search(
 ):
     """Best straight or bent rows for each (spacing at the bottom, ratio top / bottom), by the fundamental alone.
 
-    Args:
-        hypotheses: (N, 2).
-        found: (N, 3) to be filled: votes an image row less the costs, vanishing column, bend.
+    `hypotheses` is (N, 2); `found` (N, 3) is filled with votes an image row less the costs, vanishing column, bend.
     """
     height = spectrum.shape[0]
     real = np.empty((height, 1), np.float32)

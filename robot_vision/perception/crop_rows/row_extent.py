@@ -108,7 +108,8 @@ def row_cover(
         area: (N,) of ground that each covers, m^2.
         spacing: between rows, m.
         half_width: ground to either side of the robot's row that counts, m.
-        near, far: ground in view, m.
+        near: where the ground in view begins, m.
+        far: where it ends, m.
 
     Returns:
         Distance ahead (m), cover (-1 to 1) and weight (0 to 1) of each stretch, (S,) each.

@@ -61,11 +61,11 @@ class RowTracer:
     blur: float = 0.057
     stretch: float = 0.11
     stretches: int = 7
-    drift: int = 6
-    turn_cost: float = 4.78
+    drift: int = 7
+    turn_cost: float = 4.0
     drift_cost: float = 0.01
     stretch_cost: float = 1.28
-    stretched_cost: float = 1.2
+    stretched_cost: float = 0.8
     smooth: float = 3.0
 
     def __post_init__(self) -> None:
@@ -88,7 +88,8 @@ class RowTracer:
         tall = USUAL_HEIGHT / height
         band = max(1, round(self.band / tall))
         bands = -(-height // band)
-        stretches = np.linspace(-self.stretch, self.stretch, self.stretches)
+        most = self.stretch if self.stretches > 1 else 0.0
+        stretches = np.linspace(-most, most, self.stretches)
         scores = np.empty((bands, self.stretches, _PHASES), np.float32)
         score_bands(
             weight, spacing, centre, first, band, stretches, self.reach, self.power, self._kernel(), scores
@@ -117,6 +118,12 @@ class RowTracer:
         reach = int(3.0 * self.blur * _PHASES + 1.0)
         kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (self.blur * _PHASES)) ** 2)
         return np.asarray(kernel / kernel.sum(), np.float32)
+
+
+def straight(rows: StraightRows, height: int, width: int, least: float) -> TracedRows:
+    """Rows as the votes have them, without following them; see `expected`."""
+    spacing, phase, _ = expected(rows, height, least)
+    return TracedRows(0.5 * width + phase * spacing, spacing, rows.votes)
 
 
 def expected(rows: StraightRows, height: int, least: float) -> tuple[Array, Array, int]:

@@ -19,7 +19,8 @@ def score_bands(weight, spacing, centre, first, band, stretches, reach, power, s
 
     Args:
         weight: float32 (H, W).
-        spacing, centre: (H,) expected spacing and column of the row nearest the middle, px.
+        spacing: (H,) expected, px.
+        centre: (H,) expected column of the row nearest the middle, px.
         first: image row from which on there is something to see.
         band: image rows a band.
         stretches: (E,) the spacing is spacing * (1 + stretch).

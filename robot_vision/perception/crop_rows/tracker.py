@@ -22,10 +22,12 @@ from robot_vision.perception.crop_rows.ground_fit import (
     lateral,
     nearest_row,
     pieces_of,
+    tall_by_cover,
 )
 from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, row_cover
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 from robot_vision.perception.crop_rows.sight import fault_of
+from robot_vision.perception.crop_rows.start import start_on_ground
 from robot_vision.perception.lane import LaneHeading
 from robot_vision.perception.vegetation import Picture, VegetationMask
 
@@ -196,17 +198,17 @@ class RowTracker:
             sigma = float(np.sqrt(self.row_filter.covariance[2, 2]))
             bend = Curvature(curvature, float(np.clip(sigma, 5e-4, 0.015)))
         else:
-            found = self._found(picture, camera)
-            if found is None:
+            pattern = self.detector.detect(picture)
+            if pattern is None:
                 return None, "no rows stand out in this picture"
-            start, bend = found, Curvature()
-        rows = self.fit.fit(pieces, camera, self.spacing, start, bend, _tall(covered))
+            start, bend = start_on_ground(pattern, camera, self.spacing), Curvature()
+        rows = self.fit.fit(pieces, camera, self.spacing, start, bend, tall_by_cover(covered))
         if rows is None:
             return None, "hardly anything grows before the robot"
         if rows.share < self.coherence:
             return None, "what grows in this picture does not stand in rows"
-        stretch = float(np.exp(rows.values[HEIGHT] - _tall(covered)[0]))
-        if abs(np.log(stretch)) > _CONTRADICTION + 1.5 * _tall(covered)[1]:
+        stretch = float(np.exp(rows.values[HEIGHT] - tall_by_cover(covered)[0]))
+        if abs(np.log(stretch)) > _CONTRADICTION + 1.5 * tall_by_cover(covered)[1]:
             return None, (
                 f"rows stand {self.spacing / stretch:.2f} m apart for a camera {camera.height_m:g} m up, "
                 f"not {self.spacing:g} m: look at spacing, camera.height and camera.pitch"
@@ -214,31 +216,6 @@ class RowTracker:
         if max(np.abs(rows.values[3:5])) > 4.0 * self.fit.lean:
             return None, "the rows lie as if the camera had been knocked over: look at camera.pitch and roll"
         return rows, ""
-
-    def _found(self, picture: Picture, camera: Camera) -> Array | None:
-        """A start (6,) from the rows with the most votes, whatever their horizon and spacing."""
-        pattern = self.detector.detect(picture)
-        if pattern is None:
-            return None
-        height, width = picture.shape[:2]
-        last = pattern.columns(height - 1.0)
-        middle = int(np.abs(last - 0.5 * width).argmin())
-        middle = min(max(middle, 1), len(last) - 2)
-        upper = pattern.columns(0.5 * height)
-        # The straight line of the middle row and the horizon give the vanishing point
-        slope = (upper[middle] - last[middle]) / (0.5 * height - (height - 1.0))
-        column = last[middle] + slope * (pattern.horizon - (height - 1.0))
-        ahead = camera.optical_to_base @ camera.rays([[column, pattern.horizon]])[0]
-        pitch = float(np.arctan2(ahead[2], np.hypot(ahead[0], ahead[1])))
-        pitch = float(np.clip(pitch, -3.0 * self.fit.lean, 3.0 * self.fit.lean))
-        yaw = -float(np.arctan2(ahead[1], ahead[0]))
-        values = np.array([0.0, yaw, 0.0, 0.0, pitch, -0.02])
-        rays = camera.rays(np.column_stack([last[middle - 1 : middle + 2], np.full(3, height - 1.0)]))
-        places = lateral(*ground_places(rays @ camera.optical_to_base.T, camera, values), values)[0]
-        values[OFFSET] = -places[1]
-        seen = 0.5 * abs(places[2] - places[0])
-        values[HEIGHT] += float(np.clip(np.log(self.spacing / max(seen, 1e-3)), -0.25, 0.25))
-        return values
 
     def _look_along(self, pieces: Pieces, camera: Camera, values: Array, motion: Motion) -> None:
         """Note where along the way rows stand."""
@@ -302,11 +279,3 @@ def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
     x, _ = ground_places(rays, camera, values)
     far = float(x[1]) if 0.0 < x[1] < 100.0 else 100.0
     return float(x[0]), far
-
-
-def _tall(covered: float) -> tuple[float, float]:
-    """How much plants that cover so much of the ground bring it nearer: mean and deviation of the logarithm of height.
-
-    What covers the ground stands high: seedlings are flat, a canopy as high as its rows are apart.
-    """
-    return -0.02 - 0.25 * max(covered - 0.15, 0.0), 0.03 + 0.08 * max(covered - 0.15, 0.0)
