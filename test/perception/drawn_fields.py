@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.geometry import Camera, GroundPlane
+from robot_vision.geometry import Camera, rotation_from_rpy
 
 Picture = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -57,7 +57,8 @@ def drawn(
     picture = np.empty((camera.height, camera.width, 3), np.uint8)
     picture[:] = SOIL
     picture = np.clip(picture + random.normal(0.0, 4.0, picture.shape), 0, 255).astype(np.uint8)
-    ground = GroundPlane(replace(camera, roll=camera.roll + roll, pitch=camera.pitch + pitch))
+    leaning = rotation_from_rpy(roll, pitch, 0.0) @ camera.optical_to_base
+    eye = np.array([camera.x_m, 0.0, camera.height_m])
     crop = plants(sown, random)
     count = int(sown.weeds * len(crop))
     weeds = np.column_stack([random.uniform(0.0, 12.0, count), random.uniform(-6.0, 6.0, count)])
@@ -65,7 +66,8 @@ def drawn(
         for place in places:
             outline = place + radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
             if np.all(outline[:, 0] > 0.2):
-                corners = ground.to_pixels(outline)
+                flat = np.column_stack([outline, np.zeros(len(outline))])
+                corners = camera.pixels((flat - eye) @ leaning)
                 if np.isfinite(corners).all() and np.abs(corners).max() < 4000:
                     cv2.fillPoly(picture, [np.rint(corners * 16).astype(np.int32)], LEAF, cv2.LINE_AA, 4)
     return picture
