@@ -16,6 +16,13 @@ _CELLS, _BEHIND = 200, 60
 """Stretches remembered, and how many of them behind the robot."""
 _KNOWN = 0.25
 """A stretch that was looked at for less says nothing."""
+_WEIGHTS = np.array([0.25, 0.5, 0.25])
+_OPEN = 0.15
+"""Share of the usual cover that open ground has at most, all in all."""
+_TAIL = 3
+"""So many stretches of open ground may still hold the last plants of rows."""
+_NEAR_M, _ENOUGH = 3.0, 6
+"""Ground before the robot, and stretches of it, that tell what is usual."""
 _FARTHEST = 0.15
 """A stretch seen from nearer counts for more; the farthest ones for this much."""
 
@@ -74,27 +81,38 @@ class RowExtent:
     def end(self, way: float) -> float | None:
         """Metres from the robot to where the rows end, negative behind it; None: no end is known.
 
-        Stretches must have been looked at well, and so many of them be open that it is no gap.
+        It is before the first ground that was looked at all along, is as long as no gap may be, and on which next to
+        nothing stands in rows. What grows behind that, such as the grass of a meadow, is of no account.
         """
         known = self._seen > _KNOWN
         if not known.any():
             return None
-        cover = self._cover / np.maximum(self._seen, 1e-9)
-        # Single plants are missing everywhere: two stretches together are looked at
-        cover = np.convolve(cover, [0.25, 0.5, 0.25], "same")
-        stands = np.flatnonzero(known & (cover > self.sparse * self._usual(cover[known])))
-        if not len(stands):
+        # Single plants are missing everywhere: neighbours are looked at together
+        cover = np.convolve(
+            np.where(known, self._cover / np.maximum(self._seen, 1e-9), 0.0), _WEIGHTS, "same"
+        )
+        usual = self._usual(cover, known, way)
+        stands = np.flatnonzero(known & (cover > self.sparse * usual))
+        length = int(np.ceil(self.gap / CELL_M))
+        if not len(stands) or stands[0] + length + 1 >= _CELLS:
             return None
-        behind = known[stands[-1] + 1 :]
-        open_ground = int(np.argmin(behind)) if not behind.all() else len(behind)
-        if open_ground * CELL_M < self.gap:
+        begins = np.arange(stands[0] + 1, _CELLS - length)
+        looked_at = np.concatenate([[0], np.cumsum(known)])
+        covered = np.concatenate([[0.0], np.cumsum(cover)])
+        is_open = looked_at[begins + length] - looked_at[begins] == length
+        is_open &= covered[begins + length] - covered[begins] < _OPEN * usual * length
+        if not is_open.any():
             return None
-        return float((self._origin + stands[-1] + 1) * CELL_M - way)
+        first = int(begins[is_open.argmax()])
+        last = int(stands[stands < first + _TAIL].max())
+        return float((self._origin + last + 1) * CELL_M - way)
 
-    @staticmethod
-    def _usual(cover: Array) -> float:
-        """Cover of a stretch on which plants stand."""
-        return max(float(np.quantile(cover, 0.85)), 1e-3)
+    def _usual(self, cover: Array, known: NDArray[np.bool_], way: float) -> float:
+        """Cover of a stretch on which plants stand, by those near the robot where there are enough."""
+        here = int(np.floor((way + _NEAR_M) / CELL_M)) - self._origin
+        near = known & (np.arange(_CELLS) < here)
+        told = cover[near if near.sum() > _ENOUGH else known]
+        return max(float(np.quantile(told, 0.85)), 1e-3)
 
 
 def row_cover(

@@ -38,8 +38,8 @@ _CELL_PX = 8
 _CLOSED = 0.4
 #: Length of a stretch of way (m), the farthest one, and the share of it that must be grown over to be of use.
 _STRETCH_M, _FARTHEST_M, _GROWN = 0.5, 40.0, 0.4
-#: Height and spacing contradict each other beyond this share: one of them is not what was given.
-_CONTRADICTION = 0.1
+#: Height and spacing contradict each other beyond this share and twice what plants may be high: one is not as given.
+_CONTRADICTION = 0.05
 #: Without odometry, after so many pictures in a row that fit no row the search begins anew.
 _MOST_REFUSED = 8
 #: Standard deviation of the offset, in spacings, beyond which nobody knows which row this is.
@@ -208,7 +208,7 @@ class RowTracker:
         if rows.share < self.coherence:
             return None, "what grows in this picture does not stand in rows"
         stretch = float(np.exp(rows.values[HEIGHT] - tall_by_cover(covered)[0]))
-        if abs(np.log(stretch)) > _CONTRADICTION + 1.5 * tall_by_cover(covered)[1]:
+        if abs(np.log(stretch)) > _CONTRADICTION + 2.0 * tall_by_cover(covered)[1]:
             return None, (
                 f"rows stand {self.spacing / stretch:.2f} m apart for a camera {camera.height_m:g} m up, "
                 f"not {self.spacing:g} m: look at spacing, camera.height and camera.pitch"
