@@ -191,6 +191,7 @@ def warm_steps() -> list[tuple[str, Callable[[], None]]]:
     return [
         ("lines", _find_lines),
         ("vanishing points", _find_vanishing_points),
+        ("crop rows", _find_crop_rows),
     ]
 
 
@@ -198,6 +199,12 @@ def _find_lines() -> None:
     from robot_vision.perception import LineDetector
 
     LineDetector().warm_up()
+
+
+def _find_crop_rows() -> None:
+    from robot_vision.perception import CropRowDetector
+
+    CropRowDetector().warm_up()
 
 
 def _find_vanishing_points() -> None:

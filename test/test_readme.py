@@ -19,6 +19,7 @@ CLASSES = {
     "line_detector": "LineDetectorNode",
     "vp_estimator": "VpEstimatorNode",
     "corridor_steering": "CorridorSteeringNode",
+    "crop_row_steering": "CropRowSteeringNode",
     "bag_player": "BagPlayer",
     "bag_recorder": "BagRecorder",
     "simulator": "Simulator",

@@ -193,13 +193,13 @@ def test_parameters_change_live_and_nonsense_is_refused(bench: NodeBench, field:
     assert bench.set_parameter("row.spacing", 0.5).successful
 
 
-def test_raw_pictures_without_odometry_and_an_overlay(field: list[Moment]) -> None:
+def test_raw_pictures_without_odometry_an_overlay_and_silence(field: list[Moment]) -> None:
     import cv2
 
     from robot_vision.ros.domains import FreeDomain
 
     with FreeDomain() as domain:
-        bench = NodeBench(domain.id, "crop_row_steering", {"ready_patience": 0.1, "timeout": 20.0, **PLACE})
+        bench = NodeBench(domain.id, "crop_row_steering", {"ready_patience": 0.1, "timeout": 0.5, **PLACE})
         try:
             bench.speaks(Image, "image")
             bench.speaks(CameraInfo, "camera_info")
@@ -220,6 +220,8 @@ def test_raw_pictures_without_odometry_and_an_overlay(field: list[Moment]) -> No
                 assert heading_from_message(said).offset == pytest.approx(moment.truth[0], abs=0.04)
                 overlay = bench.answer("rows/overlay", header)
                 assert (np.frombuffer(overlay.data, np.uint8).reshape(240, 320, 3) != small).any()
+            bench.until(lambda: is_still(bench.said("steering")[-1]), "it stands when pictures stop")
+            assert "no picture" in bench.state("message")
         finally:
             bench.close()
 
