@@ -22,6 +22,8 @@ BENCHMARKS = {
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
     "crbd": "crop rows of single real pictures, beside the textbook's recipe",
+    "field": "crop rows of recorded drives through three simulated crops",
+    "field_loop": "crop rows driven along at 1.6 m/s, to the headland and through a gap",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "latency": "from picture to steering at 30 Hz, processes over DDS",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",

@@ -49,6 +49,8 @@ _SCATTER = 0.02
 #: Factor on the variance, for what leans all plants one way: wind, the sun, the slope; of what grows, and of the bare
 #: ground between, whose borders are the leaves of tall plants.
 _DOUBT = {0.0: 2.0, 0.5: 3.0}
+#: Share of the vegetation that stands in rows, as a rule.
+_USUAL_SHARE = 0.5
 #: Of the middle of a clump, m: no field is sown better.
 _LEAST_SCATTER = 0.008
 
@@ -211,8 +213,10 @@ class GroundFit:
         information = (
             honest * (jacobian.T @ (trust[:, None] * jacobian)) + self._prior(_ANY_CURVATURE, tall)[0]
         )
-        covariance = _DOUBT[here.aside] * np.linalg.inv(information)
         share = float(np.average(np.cos(2.0 * np.pi * residual / spacing), weights=here.weight))
+        # The less of what grows stands in rows, the more the weeds have a say
+        weedy = max(1.0, _USUAL_SHARE / max(share, 0.05)) ** 2
+        covariance = weedy * _DOUBT[here.aside] * np.linalg.inv(information)
         return RowsOnGround(values, 0.5 * (covariance + covariance.T), spacing, share, count)
 
 
