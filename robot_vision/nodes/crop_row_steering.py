@@ -55,7 +55,7 @@ class CropRowSteeringNode(SteeringNode):
         Setting("row.bend", 0.0003, "how fast the curvature may change, 1/m per square root of m", 1e-6, 0.1),
         Setting("sensitivity", "medium", "how readily plants and rows are believed", choices=tuple(PRESETS)),
         Setting("vegetation", "auto", "what tells plants; auto takes grey as infrared", choices=INDICES),
-        Setting("lean", 0.026, "usual roll and pitch of the body about its mounting, rad", 0.001, 0.5),
+        Setting("lean", 0.02, "usual roll and pitch of the body about its mounting, rad", 0.001, 0.5),
         Setting("view", 8.0, "ground that counts, m ahead of the camera", 1.0, 50.0),
         *LAW_SETTINGS,
         *STEERING_SETTINGS,

@@ -120,7 +120,7 @@ class GroundFit:
         ValueError: naming the setting that is no positive number.
     """
 
-    lean: float = float(np.deg2rad(1.5))
+    lean: float = 0.02
     narrow: float = 0.12
     far: float = 8.0
 

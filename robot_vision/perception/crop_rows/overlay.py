@@ -55,8 +55,9 @@ def draw_rows(picture: Picture, camera: Camera, estimate: RowEstimate) -> Pictur
         words = f"{1e3 * lane.offset:+.0f} mm  {np.degrees(lane.yaw):+.1f} deg  {estimate.reason}"
     if estimate.end is not None:
         words += f"  end {estimate.end:.1f} m"
-    for colour, thickness in (((0, 0, 0), 4), ((255, 255, 255), 1)):
-        cv2.putText(picture, words, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, thickness, cv2.LINE_AA)
+    (wide, high), _ = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)
+    cv2.rectangle(picture, (0, 0), (wide + 16, high + 16), (0, 0, 0), -1)
+    cv2.putText(picture, words, (8, high + 8), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (255, 255, 255), 1, cv2.LINE_AA)
     return picture
 
 
