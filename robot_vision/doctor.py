@@ -192,6 +192,7 @@ def warm_steps() -> list[tuple[str, Callable[[], None]]]:
         ("lines", _find_lines),
         ("vanishing points", _find_vanishing_points),
         ("planning", _plan),
+        ("crop rows", _find_crop_rows),
     ]
 
 
@@ -199,6 +200,12 @@ def _find_lines() -> None:
     from robot_vision.perception import LineDetector
 
     LineDetector().warm_up()
+
+
+def _find_crop_rows() -> None:
+    from robot_vision.perception import CropRowDetector
+
+    CropRowDetector().warm_up()
 
 
 def _find_vanishing_points() -> None:

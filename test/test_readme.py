@@ -20,6 +20,7 @@ CLASSES = {
     "vp_estimator": "VpEstimatorNode",
     "corridor_steering": "CorridorSteeringNode",
     "maze_planner": "MazePlannerNode",
+    "crop_row_steering": "CropRowSteeringNode",
     "bag_player": "BagPlayer",
     "bag_recorder": "BagRecorder",
     "simulator": "Simulator",

@@ -19,8 +19,8 @@ class CorridorSteering:
     """Pure pursuit of the lane's centre line, within limits of speed, turn rate and acceleration.
 
     The robot aims at the point of the centre line `lookahead` metres ahead (Coulter 1992); without a lateral offset
-    that is the vanishing point itself. It slows for a large angle, for an answer it cannot trust, and for what stands
-    in the way.
+    and a bend that is the vanishing point itself. It slows for a large angle, for an answer it cannot trust, and for
+    what stands in the way.
 
     Args:
         speed: on a free, straight way, m/s.
@@ -76,8 +76,11 @@ class CorridorSteering:
             return Steering(0.0, 0.0, "the heading is too uncertain to drive by")
         known = _trusted(lane.offset, lane.offset_variance, self.offset_trusted)
         offset = lane.offset if known else 0.0
-        distance = float(np.hypot(self.lookahead, offset))
-        bearing = -lane.yaw - float(np.arctan2(offset, self.lookahead))
+        # On a bend the centre line has moved aside where it is aimed at
+        bend = lane.curvature if np.isfinite(lane.curvature) else 0.0
+        aside = 0.5 * float(np.clip(bend * self.lookahead, -1.0, 1.0)) * self.lookahead - offset
+        distance = float(np.hypot(self.lookahead, aside))
+        bearing = -lane.yaw + float(np.arctan2(aside, self.lookahead))
         wanted = self._cruising_speed(bearing, lane)
         allowed = self._allowed_speed(clearance_m)
         obstructed = allowed < wanted

@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hears where the robot stands in its lane, says how to drive: to the middle, and straight on.
 
-Before any heading it says nothing. When headings stop for `timeout`, and when it is disabled, it says once
-that the robot shall stand still, with the stamp of the last picture, so that a replay gives the same answers
-again. The service `enable` (std_srvs/SetBool) sets the parameter `enabled`; `~/enable` does so where several
-nodes steer in one namespace.
+When it says nothing, and when it tells the robot to stand still, is told in `ros/steering.py`.
 """
 
 from __future__ import annotations
@@ -12,20 +9,16 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
-from rclpy.clock import Clock
-from rclpy.parameter import Parameter
-from rclpy.timer import Timer
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import Range
-from std_msgs.msg import Header
-from std_srvs.srv import SetBool
 
 from robot_vision.control import CorridorSteering
 from robot_vision.ros import messages, qos
 from robot_vision.ros.diagnostics import Level
-from robot_vision.ros.node import VisionNode, stamp_ns
+from robot_vision.ros.node import stamp_ns
 from robot_vision.ros.parameters import Setting
 from robot_vision.ros.run import run_node
+from robot_vision.ros.steering import STEERING_SETTINGS, SteeringNode
 
 LIBRARY_SETTINGS = (
     Setting("speed", 0.5, "speed on a free, straight way, m/s", 0.01, 20.0),
@@ -39,26 +32,17 @@ LIBRARY_SETTINGS = (
 )
 
 
-class CorridorSteeringNode(VisionNode):
+class CorridorSteeringNode(SteeringNode):
     """`heading` and `clearance` to `steering`."""
 
-    SETTINGS = (
-        *LIBRARY_SETTINGS,
-        Setting("enabled", True, "whether to steer; the service enable sets it"),
-        Setting("timeout", 0.5, "stand still after so long without a heading, s", 0.05, 60.0),
-        Setting("max_age", 0.0, "oldest picture to steer by, s; 0: any, as for replays", 0.0, 60.0),
-    )
+    SETTINGS = (*LIBRARY_SETTINGS, *STEERING_SETTINGS)
+    STEERS_BY = "heading"
+    ADVICE = "look what vp_estimator says on /diagnostics"
 
     def __init__(self) -> None:
         super().__init__("corridor_steering")
         self._corridor = CorridorSteering()
-        self._enabled = True
-        self._timeout_s = 0.5
-        self._header: Header | None = None
-        self._drives = False
-        self._max_age_s = 0.0
         self._clearance: tuple[int, float] | None = None
-        self._steering = self.say(TwistStamped, "steering", qos.ANSWER)
         self._clearances = self.hear(Range, "clearance", self._hear_clearance, qos.NEWEST)
         self.hear(
             PoseWithCovarianceStamped,
@@ -68,15 +52,6 @@ class CorridorSteeringNode(VisionNode):
             required=True,
             picture=True,
         )
-        for name in ("enable", "~/enable"):
-            self.create_service(SetBool, name, self._enable)
-        self._watch: Timer = self.create_timer(
-            self.settings["timeout"], self._stop_after_silence, clock=self._watch_clock()
-        )
-        self._watch.cancel()
-        self._clock_watch = self.create_timer(
-            self.settings["timeout"], self._stop_without_clock, clock=self.steady_clock
-        )
         self.use_settings()
 
     def configure(self, values: dict[str, Any]) -> None:
@@ -85,24 +60,16 @@ class CorridorSteeringNode(VisionNode):
         CorridorSteering(**own)  # refuses what makes no sense
         for name, value in own.items():
             setattr(self._corridor, name, value)
-        self._timeout_s = values["timeout"]
-        self._max_age_s = values["max_age"]
-        self._watch.timer_period_ns = round(1e9 * self._timeout_s)
-        enabled, self._enabled = self._enabled, values["enabled"]
-        if enabled and not self._enabled:
-            self._stand_still()
-            self.diagnostics.report(Level.WARN, "disabled", "call the service enable with true")
-        elif self._enabled and not enabled:
-            self.diagnostics.report(Level.OK, "enabled; waits for the next heading")
+        super().configure(values)
 
     def on_clock_jump_back(self) -> None:
         """Forget the last command and what stands ahead."""
         self._corridor.reset()
         self._clearance = None
 
-    def _watch_clock(self) -> Clock:
-        """Give the time by which silence is measured: that of the replay, if there is one."""
-        return self.get_clock() if self.get_parameter("use_sim_time").value else self.steady_clock
+    def reset_steering(self) -> None:
+        """Begin from standing."""
+        self._corridor.reset()
 
     def _hear_clearance(self, message: Range) -> None:
         self._clearance = (stamp_ns(message.header.stamp), messages.clearance_from_message(message))
@@ -119,11 +86,11 @@ class CorridorSteeringNode(VisionNode):
         now_ns = stamp_ns(message.header.stamp)
         refusal = self._refusal(now_ns)
         if refusal:
-            self._stand_still()
+            self.stand_still()
             self.diagnostics.report(Level.WARN, f"stands still: {refusal}")
             return
         steering = self._corridor.update(lane, 1e-9 * now_ns, self._clearance and self._clearance[1])
-        self._say(steering.speed, steering.turn_rate)
+        self.obey(steering.speed, steering.turn_rate)
         self.answered(message.header.stamp, began)
         if steering.reason:
             self.diagnostics.report(Level.WARN, steering.reason)
@@ -132,48 +99,10 @@ class CorridorSteeringNode(VisionNode):
 
     def _refusal(self, now_ns: int) -> str:
         """Say why the picture with this stamp is none to steer by; empty when it is."""
-        age_s = 1e-9 * (self.get_clock().now().nanoseconds - now_ns)
-        if self._max_age_s and age_s > self._max_age_s:
-            return f"the picture is {age_s:.2f} s old"
-        if self._clearance is not None and now_ns - self._clearance[0] > 1e9 * self._timeout_s:
+        old = self.refusal_of_age(now_ns)
+        if not old and self._clearance is not None and now_ns - self._clearance[0] > 1e9 * self._timeout_s:
             return "clearance has fallen silent, so nobody looks at what is ahead"
-        return ""
-
-    def _stop_without_clock(self) -> None:
-        """Stop where the time of a replay has ended for good: silence cannot be measured by it any more."""
-        if self._drives and self.get_parameter("use_sim_time").value and not self.count_publishers("/clock"):
-            self._stand_still()
-            self.diagnostics.report(Level.WARN, "stands still: nobody publishes /clock any more")
-
-    def _stop_after_silence(self) -> None:
-        self._stand_still()
-        self.diagnostics.report(
-            Level.WARN,
-            f"stands still: no heading for {self._timeout_s:g} s",
-            "look what vp_estimator says on /diagnostics",
-        )
-
-    def _stand_still(self) -> None:
-        self._watch.cancel()
-        self._corridor.reset()
-        self._say(0.0, 0.0)
-
-    def _say(self, speed: float, turn_rate: float) -> None:
-        if self._header is None:
-            return
-        self._drives = speed != 0.0 or turn_rate != 0.0
-        self._steering.publish(messages.steering_to_message(self._header, speed, turn_rate))
-
-    def stop(self) -> None:
-        """Leave no robot driving by the last word of a node that is gone; a replay drives none."""
-        if self._drives and not self.get_parameter("use_sim_time").value:
-            self._stand_still()
-
-    def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        result = self.set_parameters([Parameter("enabled", value=request.data)])[0]
-        response.success = result.successful
-        response.message = result.reason or ("steers" if request.data else "stands still")
-        return response
+        return old
 
 
 def main(args: list[str] | None = None) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fast the robot turned between two pictures, from odometry that comes at a rhythm of its own."""
+"""How the robot moved between two pictures, from odometry that comes at a rhythm of its own."""
 
 from __future__ import annotations
 
@@ -49,3 +49,25 @@ class TurnRateHistory:
         total += newest[1] * (until_s - before)
         covered += until_s - before
         return total / covered if covered > 0.0 else newest[1]
+
+
+class MotionHistory:
+    """Keeps speeds and turn rates with their stamps, as `TurnRateHistory` keeps turn rates."""
+
+    def __init__(self) -> None:
+        self._speeds = TurnRateHistory()
+        self._turn_rates = TurnRateHistory()
+
+    def add(self, stamp_s: float, speed: float, turn_rate: float) -> None:
+        """Take in a speed (m/s) and a turn rate (rad/s, counter-clockwise)."""
+        self._speeds.add(stamp_s, speed)
+        self._turn_rates.add(stamp_s, turn_rate)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._speeds.clear()
+        self._turn_rates.clear()
+
+    def mean(self, since_s: float, until_s: float) -> tuple[float | None, float | None]:
+        """Mean speed and turn rate from one picture to the next; None when odometry is missing or too old."""
+        return self._speeds.mean(since_s, until_s), self._turn_rates.mean(since_s, until_s)
