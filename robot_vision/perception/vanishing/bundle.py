@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 #: of real walls and kerbs are not straighter than that. Both measured on pictures with known vanishing points.
 END_SIGMA = 0.6
 DIRECTION_SIGMA = np.deg2rad(0.35)
+#: A line that does not tell its contrast still counts, grey levels a pixel.
+_LEAST_CONTRAST = 0.1
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Bundle:
         middles: (N, 2) midpoints.
         halves: (N,) half lengths.
         sigma: (N,) standard deviation of the direction, rad.
-        weight: (N,) root of the length, mean 1.
+        weight: (N,) root of length times contrast, mean 1: long clear edges are seldom clutter.
         source: (N,) index of the line in the segments given.
     """
 
@@ -55,7 +57,8 @@ class Bundle:
         halves = 0.5 * np.hypot(tangent[:, 0], tangent[:, 1])
         tangent = tangent / (2.0 * halves)[:, None] if len(source) else tangent
         offset = tangent[:, 0] * middles[:, 1] - tangent[:, 1] * middles[:, 0]
-        root = np.sqrt(lengths)
+        contrast = np.maximum(np.nan_to_num(segments.strength[source]), _LEAST_CONTRAST)
+        root = np.sqrt(lengths * contrast)
         return cls(
             lines=np.column_stack([tangent[:, 1], -tangent[:, 0], offset]),
             middles=middles,

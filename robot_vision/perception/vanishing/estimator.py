@@ -13,9 +13,9 @@ from robot_vision.geometry.sphere import EqualAreaCells, angle_between, front_ha
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing.bundle import Bundle
 from robot_vision.perception.vanishing.focal import PRIOR_SIGMA, find_focal_length
-from robot_vision.perception.vanishing.frames import orthogonal_frames
+from robot_vision.perception.vanishing.frames import best_frame
 from robot_vision.perception.vanishing.points import VanishingPoints
-from robot_vision.perception.vanishing.refit import SHARED_ERROR, refit_each, refit_frame
+from robot_vision.perception.vanishing.refit import SHARED_ERROR, refit_each
 from robot_vision.perception.vanishing.roles import primary_first, roles
 from robot_vision.perception.vanishing.support import agreement, assignment, false_alarms
 from robot_vision.perception.vanishing.votes import proposals
@@ -33,9 +33,9 @@ class VanishingPointEstimator:
     """Finds vanishing points on the Gaussian sphere, with a focal length if none is known.
 
     1. Pairs of the longest lines vote into cells of equal area; the fullest cells are proposals.
-    2. About every proposal one vote of all lines gives its two orthogonal partners; the best frame is turned to
-       its lines. A scene need not be built at right angles: a member of the frame stays only if its own lines say
-       so, or if the other two do.
+    2. About every proposal one vote of all lines gives its two orthogonal partners; the few best frames are turned
+       to their lines, and the one they support most is kept. A scene need not be built at right angles: a member of
+       the frame stays only if its own lines say so, or if the other two do.
     3. Each member is refitted to its own lines, held to the frame by a soft spring.
     4. Lines left over propose further vanishing points, until what is left is clutter.
 
@@ -54,8 +54,8 @@ class VanishingPointEstimator:
 
     cell: float = float(np.deg2rad(3.0))
     voters: int = 60
-    candidates: int = 8
-    most_lines: int = 300
+    candidates: int = 12
+    most_lines: int = 400
     orthogonality: float = float(np.deg2rad(1.0))
     certainty: float = 0.01
     least_share: float = 0.2
@@ -130,8 +130,7 @@ class VanishingPointEstimator:
             return None
         if ahead is not None:
             proposed = np.concatenate([ahead[None], proposed])
-        frames, score = orthogonal_frames(bundle, proposed)
-        return refit_frame(bundle, frames[int(np.argmax(score))])
+        return best_frame(bundle, proposed)
 
     def _members(self, bundle: Bundle, frame: Array | None) -> tuple[Array, Array]:
         """Members of the frame that are believed, each refitted: (M, 3) and covariance (M, 2, 2)."""

@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 SHARED_ERROR = 1.2
 
 
-def refit_frame(bundle: Bundle, frame: Array, rounds: int = 8) -> Array:
-    """Turn an orthogonal frame (3, 3), directions in rows, to where its lines lead."""
+def refit_frame(bundle: Bundle, frame: Array, rounds: int = 8) -> tuple[Array, float]:
+    """Turn an orthogonal frame (3, 3), directions in rows, to where its lines lead; with their support for it."""
     from robot_vision.perception.vanishing import kernels
 
     turned = np.array(frame, dtype=np.float64)
-    kernels.turn_frame(*bundle.arrays, turned, TOLERANCE, rounds)
-    return turned
+    support = kernels.turn_frame(*bundle.arrays, turned, TOLERANCE, rounds)
+    return turned, float(support)
 
 
 def refit_each(bundle: Bundle, directions: Array, prior_sigma: float, rounds: int = 6) -> tuple[Array, Array]:
