@@ -55,7 +55,7 @@ class LineDetector:
     enough: int = 120
     min_length: float = 15.0
     max_gap: int = 4
-    blur: float = 0.6
+    blur: float = 0.8
     largest_area: int = 500_000
     _finder: _Finder | None = field(default=None, init=False, repr=False, compare=False)
     _shape: tuple[int, ...] = field(default=(), init=False, repr=False, compare=False)

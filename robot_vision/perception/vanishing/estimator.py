@@ -15,7 +15,7 @@ from robot_vision.perception.vanishing.bundle import Bundle
 from robot_vision.perception.vanishing.focal import PRIOR_SIGMA, find_focal_length
 from robot_vision.perception.vanishing.frames import best_frame
 from robot_vision.perception.vanishing.points import VanishingPoints
-from robot_vision.perception.vanishing.refit import SHARED_ERROR, refit_each
+from robot_vision.perception.vanishing.refit import refit_each
 from robot_vision.perception.vanishing.roles import primary_first, roles
 from robot_vision.perception.vanishing.support import agreement, assignment, false_alarms
 from robot_vision.perception.vanishing.votes import proposals
@@ -93,6 +93,8 @@ class VanishingPointEstimator:
             bundle, camera, focal_sigma, directions, covariance = self._members_and_focal_length(
                 bundle, camera
             )
+        if ahead is not None:
+            directions, covariance = self._add_expected(bundle, directions, covariance, ahead)
         members = len(directions)
         directions, covariance = self._add_others(bundle, directions, covariance)
         return self._answer(bundle, directions, covariance, members, camera, len(lines), focal_sigma, ahead)
@@ -136,7 +138,7 @@ class VanishingPointEstimator:
         """Members of the frame that are believed, each refitted: (M, 3) and covariance (M, 2, 2)."""
         if frame is None:
             return np.zeros((0, 3)), np.zeros((0, 2, 2))
-        directions, information = refit_each(bundle, frame, self.orthogonality)
+        directions, covariance = refit_each(bundle, frame, self.orthogonality)
         nearest, support = assignment(bundle.residuals(directions))
         pairs = 0.5 * len(bundle) ** 2
         believed = np.array(
@@ -144,9 +146,26 @@ class VanishingPointEstimator:
         )
         if believed.sum() >= 2:
             believed[:] = True
-        spring = np.eye(2) / self.orthogonality**2
-        covariance = SHARED_ERROR * np.linalg.inv(information + spring)
         return directions[believed], covariance[believed]
+
+    def _add_expected(
+        self, bundle: Bundle, directions: Array, covariance: Array, ahead: Array
+    ) -> tuple[Array, Array]:
+        """The direction earlier pictures lead to expect, unless it is there or nothing speaks for it.
+
+        One direction named beforehand is one test, not one of all pairs of lines: few lines confirm it.
+        """
+        if len(directions) and angle_between(directions, ahead).min() < self.cell:
+            return directions, covariance
+        free = np.ones(len(bundle), bool)
+        if len(directions):
+            free = assignment(bundle.residuals(directions))[0] < 0
+        rest = bundle[free]
+        found, sure = refit_each(rest, ahead[None], self.orthogonality)
+        agrees = agreement(rest.residuals(found))[0] > 0.0
+        if false_alarms(rest, agrees, 0, 1.0) >= self.certainty or agrees.sum() < _FEWEST_LINES:
+            return directions, covariance
+        return np.concatenate([directions, found]), np.concatenate([covariance, sure])
 
     def _add_others(self, bundle: Bundle, directions: Array, covariance: Array) -> tuple[Array, Array]:
         """Further vanishing points among the lines left over, until what is left is clutter."""
@@ -162,7 +181,7 @@ class VanishingPointEstimator:
                 break
             support = agreement(rest.residuals(proposed)) @ rest.weight
             best = proposed[[int(np.argmax(support))]]
-            found, information = refit_each(rest, best, 2.0 * self.cell)
+            found, sure = refit_each(rest, best, 2.0 * self.cell)
             support = agreement(rest.residuals(found))[0]
             certain = false_alarms(rest, support > 0.0, _LINES_A_POINT, 0.5 * len(rest) ** 2) < self.certainty
             certain &= float(support @ rest.weight) > max(
@@ -172,7 +191,7 @@ class VanishingPointEstimator:
             if not certain or near:
                 break
             directions = np.concatenate([directions, found])
-            covariance = np.concatenate([covariance, SHARED_ERROR * np.linalg.inv(information + np.eye(2))])
+            covariance = np.concatenate([covariance, sure])
         return directions, covariance
 
     def _answer(

@@ -32,20 +32,42 @@ def at_ratio(lines, middles, halves, ratio, new_lines, new_middles, new_halves):
 
 
 @njit(**FAST)
+def _gather(lines, sigma, weight, frame, nearest, residual, levers, h, pull, mixed):
+    """Normal equations: of the rotation into `h` and `pull`, mixed terms into `mixed`, of the stretch returned."""
+    j = np.empty(3)
+    own = own_pull = 0.0
+    for i in range(len(lines)):
+        k = nearest[i]
+        if k < 0:
+            continue
+        scale = 1.0 / (levers[i] * sigma[i])
+        j[0] = scale * (frame[k, 1] * lines[i, 2] - frame[k, 2] * lines[i, 1])
+        j[1] = scale * (frame[k, 2] * lines[i, 0] - frame[k, 0] * lines[i, 2])
+        j[2] = scale * (frame[k, 0] * lines[i, 1] - frame[k, 1] * lines[i, 0])
+        stretch = -scale * lines[i, 2] * frame[k, 2]
+        for a in range(3):
+            pull[a] += weight[i] * j[a] * residual[i]
+            mixed[a] += weight[i] * j[a] * stretch
+            for b in range(3):
+                h[a, b] += weight[i] * j[a] * j[b]
+        own += weight[i] * stretch * stretch
+        own_pull += weight[i] * stretch * residual[i]
+    for a in range(3):
+        h[a, a] += 1e-6
+    return own, own_pull
+
+
+@njit(**FAST)
 def turn_frame_and_stretch(lines, middles, halves, sigma, weight, frame, ratio, stiffness, tolerance, rounds):
     """Gauss-Newton on the rotation of an orthogonal frame (3, 3), in place, and on the logarithm of the focal length.
 
     Turning by a small vector w moves a direction v by w x v, and l . (w x v) = w . (v x l); of the line
     (a, b, c / ratio) only the last part moves with the focal length.
 
-    Args:
-        ratio: of the focal length to the one assumed, to begin with.
-        stiffness: of the spring that holds its logarithm to 0.
-        tolerance: residual at which a line's support ends.
-        rounds: most steps.
+    `ratio` is that of the focal length to the one assumed, to begin with; `stiffness` of the spring that holds its
+    logarithm to 0.
 
-    Returns:
-        The ratio found, the information on its logarithm with the rotation left free, the support of all lines.
+    Returns the ratio found, the information on its logarithm with the rotation left free, the support of all lines.
     """
     n = len(lines)
     scaled, centres, reaches = np.empty((n, 3)), np.empty((n, 2)), np.empty(n)
@@ -59,30 +81,12 @@ def turn_frame_and_stretch(lines, middles, halves, sigma, weight, frame, ratio, 
         at_ratio(lines, middles, halves, ratio, scaled, centres, reaches)
         wide = tolerance * (2.0 if step < _WIDE_ROUNDS else 1.0)
         assign(scaled, centres, reaches, sigma, frame, wide, nearest, support, residual, levers)
-        h[:] = 0.0
-        pull[:] = 0.0
-        mixed[:] = 0.0
-        own = stiffness
-        own_pull = stiffness * math.log(ratio)
-        for i in range(n):
-            k = nearest[i]
-            if k < 0:
-                continue
-            scale = 1.0 / (levers[i] * sigma[i])
-            j[0] = scale * (frame[k, 1] * scaled[i, 2] - frame[k, 2] * scaled[i, 1])
-            j[1] = scale * (frame[k, 2] * scaled[i, 0] - frame[k, 0] * scaled[i, 2])
-            j[2] = scale * (frame[k, 0] * scaled[i, 1] - frame[k, 1] * scaled[i, 0])
-            stretch = -scale * scaled[i, 2] * frame[k, 2]
-            w = weight[i] * support[i]
-            for a in range(3):
-                pull[a] += w * j[a] * residual[i]
-                mixed[a] += w * j[a] * stretch
-                for b in range(3):
-                    h[a, b] += w * j[a] * j[b]
-            own += w * stretch * stretch
-            own_pull += w * stretch * residual[i]
-        for a in range(3):
-            h[a, a] += 1e-6
+        h[:], pull[:], mixed[:] = 0.0, 0.0, 0.0
+        own, own_pull = _gather(
+            scaled, sigma, weight * support, frame, nearest, residual, levers, h, pull, mixed
+        )
+        own += stiffness
+        own_pull += stiffness * math.log(ratio)
         # Block elimination of the rotation: what it cannot explain tells of the focal length.
         solve3(h, pull, by_pull)
         solve3(h, mixed, by_mixed)

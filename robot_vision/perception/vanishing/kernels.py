@@ -139,11 +139,23 @@ def _tangents(d, t):
 
 @njit(**FAST)
 def move_each(
-    lines, middles, halves, sigma, weight, directions, start, stiffness, tolerance, rounds, information
+    lines,
+    middles,
+    halves,
+    sigma,
+    weight,
+    directions,
+    start,
+    stiffness,
+    tolerance,
+    rounds,
+    information,
+    spread,
 ):
     """Gauss-Newton on each direction (K, 3) by itself, in place, held to `start` by a spring (rad^-2).
 
-    `information` (K, 2, 2) receives what the lines alone say, in the tangent planes.
+    `information` (K, 2, 2) receives what the lines alone say, in the tangent planes, `spread` (K, 2) their support
+    and the squared residuals summed with it.
     """
     n, count = len(lines), len(directions)
     nearest = np.empty(n, np.int64)
@@ -153,6 +165,7 @@ def move_each(
     for _ in range(rounds):
         assign(lines, middles, halves, sigma, directions, tolerance, nearest, support, residual, levers)
         information[:] = 0.0
+        spread[:] = 0.0
         g[:] = 0.0
         for k in range(count):
             _tangents(directions[k], t[k])
@@ -169,6 +182,8 @@ def move_each(
             information[k, 1, 1] += w * b * b
             g[k, 0] += w * a * residual[i]
             g[k, 1] += w * b * residual[i]
+            spread[k, 0] += w
+            spread[k, 1] += w * residual[i] * residual[i]
         largest = 0.0
         for k in range(count):
             information[k, 1, 0] = information[k, 0, 1]
