@@ -139,10 +139,15 @@ class VanishingPointEstimator:
         if frame is None:
             return np.zeros((0, 3)), np.zeros((0, 2, 2))
         directions, covariance = refit_each(bundle, frame, self.orthogonality)
-        nearest, support = assignment(bundle.residuals(directions))
+        residuals = bundle.residuals(directions)
+        nearest, _ = assignment(residuals)
         pairs = 0.5 * len(bundle) ** 2
         believed = np.array(
-            [false_alarms(bundle, nearest == k, _LINES_A_POINT, pairs) < self.certainty for k in range(3)]
+            [
+                false_alarms(bundle, residuals[k], (nearest == k) | (nearest < 0), _LINES_A_POINT, pairs)
+                < self.certainty
+                for k in range(3)
+            ]
         )
         if believed.sum() >= 2:
             believed[:] = True
@@ -162,8 +167,9 @@ class VanishingPointEstimator:
             free = assignment(bundle.residuals(directions))[0] < 0
         rest = bundle[free]
         found, sure = refit_each(rest, ahead[None], self.orthogonality)
-        agrees = agreement(rest.residuals(found))[0] > 0.0
-        if false_alarms(rest, agrees, 0, 1.0) >= self.certainty or agrees.sum() < _FEWEST_LINES:
+        residuals = rest.residuals(found)[0]
+        few = (agreement(residuals) > 0.0).sum() < _FEWEST_LINES
+        if few or false_alarms(rest, residuals, np.ones(len(rest), bool), 0, 1.0) >= self.certainty:
             return directions, covariance
         return np.concatenate([directions, found]), np.concatenate([covariance, sure])
 
@@ -182,8 +188,9 @@ class VanishingPointEstimator:
             support = agreement(rest.residuals(proposed)) @ rest.weight
             best = proposed[[int(np.argmax(support))]]
             found, sure = refit_each(rest, best, 2.0 * self.cell)
-            support = agreement(rest.residuals(found))[0]
-            certain = false_alarms(rest, support > 0.0, _LINES_A_POINT, 0.5 * len(rest) ** 2) < self.certainty
+            residuals, all_free = rest.residuals(found)[0], np.ones(len(rest), bool)
+            support, pairs = agreement(residuals), 0.5 * len(rest) ** 2
+            certain = false_alarms(rest, residuals, all_free, _LINES_A_POINT, pairs) < self.certainty
             certain &= float(support @ rest.weight) > max(
                 self.least_support, self.least_share * float(rest.weight.sum())
             )

@@ -90,7 +90,7 @@ def turn_frame_and_stretch(lines, middles, halves, sigma, weight, frame, ratio, 
         # Block elimination of the rotation: what it cannot explain tells of the focal length.
         solve3(h, pull, by_pull)
         solve3(h, mixed, by_mixed)
-        information = own - (mixed * by_mixed).sum()
+        information = max(own - (mixed * by_mixed).sum(), stiffness)
         if arrived or step == rounds:
             break
         stretch = -(own_pull - (mixed * by_pull).sum()) / information

@@ -13,6 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
+from robot_vision.perception.vanishing.bundle import WITHIN
+
 #: Division by zero gives inf, as in numpy.
 FAST = {"cache": True, "error_model": "numpy"}
 _LARGEST_TURN = 0.1
@@ -23,9 +25,10 @@ _WIDE_ROUNDS = 2
 
 @njit(**FAST)
 def reach(lines, middles, halves, i, x, y, z):
-    """Lever of line i for the direction (x, y, z); see `Bundle.reach`."""
+    """Lever of line i for the direction (x, y, z), infinitely short where the line contains it; see `Bundle.reach`."""
     across, down = x - z * middles[i, 0], y - z * middles[i, 1]
-    return max(math.sqrt(across * across + down * down), abs(z) * halves[i]) + 1e-9
+    lever = math.sqrt(across * across + down * down)
+    return lever if lever > WITHIN * abs(z) * halves[i] else 0.0
 
 
 @njit(**FAST)
@@ -38,6 +41,8 @@ def assign(lines, middles, halves, sigma, directions, tolerance, nearest, suppor
         for k in range(len(directions)):
             x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
             lever = reach(lines, middles, halves, i, x, y, z)
+            if lever == 0.0:
+                continue
             r = (lines[i, 0] * x + lines[i, 1] * y + lines[i, 2] * z) / (lever * sigma[i])
             if abs(r) < best:
                 best = abs(r)
@@ -238,8 +243,10 @@ def partner_votes(lines, middles, halves, sigma, weight, proposed, tolerance, bi
         for i in range(len(lines)):
             l0, l1, l2 = lines[i, 0], lines[i, 1], lines[i, 2]
             lever = reach(lines, middles, halves, i, v[0], v[1], v[2])
-            r = (l0 * v[0] + l1 * v[1] + l2 * v[2]) / (lever * sigma[i] * tolerance)
-            own = max(0.0, 1.0 - r * r)
+            own = 0.0
+            if lever > 0.0:
+                r = (l0 * v[0] + l1 * v[1] + l2 * v[2]) / (lever * sigma[i] * tolerance)
+                own = max(0.0, 1.0 - r * r)
             own_score += weight[i] * own
             if own >= 0.9:
                 continue
@@ -250,8 +257,9 @@ def partner_votes(lines, middles, halves, sigma, weight, proposed, tolerance, bi
             x = cosine * t[0, 0] + sine * t[1, 0]
             y = cosine * t[0, 1] + sine * t[1, 1]
             z = cosine * t[0, 2] + sine * t[1, 2]
-            half = tolerance * sigma[i] * reach(lines, middles, halves, i, x, y, z) / slope
-            if half >= widest * width:
+            lever = reach(lines, middles, halves, i, x, y, z)
+            half = tolerance * sigma[i] * lever / slope
+            if lever == 0.0 or half >= widest * width:
                 continue
             at = math.atan2(sine, cosine) / width
             half = max(half / width, 0.75)
