@@ -26,7 +26,7 @@ from robot_vision.bags.messages import stamp_ns, yaw_of
 from robot_vision.bags.trajectory import read_poses
 from robot_vision.geometry import Camera
 from robot_vision.perception import HeadingEstimate, HeadingEstimator, LineDetector, Role
-from robot_vision.perception.odometry import TurnRateHistory
+from robot_vision.perception.odometry import RateHistory
 
 Set = TypeVar("Set")
 
@@ -97,7 +97,7 @@ Followed = list[tuple[int, HeadingEstimate]]
 @pytest.fixture(scope="module", params=[True, False], ids=["odometry", "alone"])
 def corridor(request: pytest.FixtureRequest) -> tuple[Followed, dict[int, tuple[float, float]]]:
     """Answers of the recorded corridor by stamp, and the truth: yaw (rad) and offset (m)."""
-    detector, estimator, rates = LineDetector(), HeadingEstimator(), TurnRateHistory()
+    detector, estimator, rates = LineDetector(), HeadingEstimator(), RateHistory()
     camera: Camera | None = None
     truth: dict[int, tuple[float, float]] = {}
     answers: Followed = []
