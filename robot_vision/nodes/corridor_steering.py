@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hears where the robot stands in its lane, says how to drive: to the middle, and straight on.
+"""Hears where the robot stands in its lane and how that goes on, says how to drive: to the middle, and on along it.
 
+A heading in the frame `road` is steered by only together with the `path_ahead` of the same picture: a road bends.
 When it says nothing, and when it tells the robot to stand still, is told in `ros/steering.py`.
 """
 
@@ -9,12 +10,18 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Path
+from numpy.typing import NDArray
 from sensor_msgs.msg import Range
+from std_msgs.msg import Header
 
 from robot_vision.control import CorridorSteering
+from robot_vision.perception import LaneHeading
 from robot_vision.ros import messages, qos
 from robot_vision.ros.diagnostics import Level
+from robot_vision.ros.join import ExactJoin
 from robot_vision.ros.node import stamp_ns
 from robot_vision.ros.parameters import Setting
 from robot_vision.ros.run import run_node
@@ -23,9 +30,12 @@ from robot_vision.ros.steering import STEERING_SETTINGS, SteeringNode
 LIBRARY_SETTINGS = (
     Setting("speed", 0.5, "speed on a free, straight way, m/s", 0.01, 20.0),
     Setting("lookahead", 1.2, "distance of the point aimed at, m; shorter is brisker", 0.05, 50.0),
+    Setting("lookahead_time", 0.8, "at speed, so far ahead, s", 0.01, 10.0),
+    Setting("keep", 0.0, "how far to the left of the centre line to drive, m", -50.0, 50.0),
     Setting("most_turn_rate", 1.0, "limit of the turn rate, rad/s", 0.01, 20.0),
     Setting("most_acceleration", 0.5, "limit of the acceleration and of braking, m/s^2", 0.01, 20.0),
     Setting("most_turn_acceleration", 3.0, "limit of the change of the turn rate, rad/s^2", 0.01, 100.0),
+    Setting("most_side_acceleration", 1.5, "limit in bends, m/s^2", 0.01, 20.0),
     Setting("stop_distance", 0.5, "what is left before an obstacle, m", 0.01, 50.0),
     Setting("yaw_trusted", 0.175, "standard deviation of the yaw beyond which to stop, rad", 0.001, 3.2),
     Setting("offset_trusted", 0.3, "standard deviation beyond which the offset is not used, m", 0.001, 50.0),
@@ -33,7 +43,7 @@ LIBRARY_SETTINGS = (
 
 
 class CorridorSteeringNode(SteeringNode):
-    """`heading` and `clearance` to `steering`."""
+    """`heading`, `path_ahead` and `clearance` to `steering`."""
 
     SETTINGS = (*LIBRARY_SETTINGS, *STEERING_SETTINGS)
     STEERS_BY = "heading"
@@ -43,7 +53,9 @@ class CorridorSteeringNode(SteeringNode):
         super().__init__("corridor_steering")
         self._corridor = CorridorSteering()
         self._clearance: tuple[int, float] | None = None
+        self._on_bends: ExactJoin[Any] = ExactJoin(("heading", "path_ahead"), self._drive)
         self._clearances = self.hear(Range, "clearance", self._hear_clearance, qos.NEWEST)
+        self.hear(Path, "path_ahead", self._hear_path, qos.NEWEST)
         self.hear(
             PoseWithCovarianceStamped,
             "heading",
@@ -65,6 +77,7 @@ class CorridorSteeringNode(SteeringNode):
     def on_clock_jump_back(self) -> None:
         """Forget the last command and what stands ahead."""
         self._corridor.reset()
+        self._on_bends.reset()
         self._clearance = None
 
     def reset_steering(self) -> None:
@@ -82,16 +95,31 @@ class CorridorSteeringNode(SteeringNode):
         self._header = message.header
         if not self._enabled:
             return
-        self._watch.reset()
         now_ns = stamp_ns(message.header.stamp)
+        if message.header.frame_id == "road":
+            self._on_bends.add("heading", now_ns, (message.header, lane, began))
+        else:
+            self._drive((message.header, lane, began), None)
+
+    def _hear_path(self, message: Path) -> None:
+        self._on_bends.add("path_ahead", stamp_ns(message.header.stamp), messages.path_from_message(message))
+
+    def _drive(self, heading: tuple[Header, LaneHeading, float], path: NDArray[np.float64] | None) -> None:
+        """Steer by a heading, on a road by the path that belongs to it."""
+        header, lane, began = heading
+        if not self._enabled:
+            return
+        self._watch.reset()
+        now_ns = stamp_ns(header.stamp)
         refusal = self._refusal(now_ns)
         if refusal:
             self.stand_still()
             self.diagnostics.report(Level.WARN, f"stands still: {refusal}")
             return
-        steering = self._corridor.update(lane, 1e-9 * now_ns, self._clearance and self._clearance[1])
+        clearance = self._clearance and self._clearance[1]
+        steering = self._corridor.update(lane, 1e-9 * now_ns, clearance, path)
         self.obey(steering.speed, steering.turn_rate)
-        self.answered(message.header.stamp, began)
+        self.answered(header.stamp, began)
         if steering.reason:
             self.diagnostics.report(Level.WARN, steering.reason)
         else:
