@@ -32,7 +32,7 @@ Progress = Callable[[int], None]
 #: walls of a town are quite at right angles. Measured on pictures of towns with a known camera.
 _SCATTER = 0.03
 #: Pictures less sure than this (sd of the logarithm) hardly tell anything and are not counted.
-_TELLING = 0.3
+_TELLING = 0.2
 #: How near (logarithm) to the common answer a picture must come to agree with it, besides its own error.
 _NEAR = 0.08
 _CERTAINTY = 0.01
