@@ -33,11 +33,12 @@ def run(quick: bool) -> list[Table]:
     return [_table([drive(seed) for seed in (QUICK_SEEDS if quick else SEEDS)])]
 
 
-def drive(seed: int, **settings: Any) -> dict[str, Any]:
+def drive(seed: int, parameters: dict[str, dict[str, Any]] | None = None, **settings: Any) -> dict[str, Any]:
     """Let the real nodes drive 30 m of corridor in lockstep, from 0.4 m and 10 degrees off.
 
     Args:
         seed: of the corridor, of noise and leaning.
+        parameters: of the nodes, by node; None: those for the corridor.
         settings: further parameters of the simulator.
 
     Returns:
@@ -48,7 +49,7 @@ def drive(seed: int, **settings: Any) -> dict[str, Any]:
         ProcessError: a node failed.
     """
     camera = standard_camera()
-    parameters: dict[str, dict[str, Any]] = {
+    parameters = parameters or {
         LINES: {},
         VANISHING: {"camera.height": camera.height_m, "camera.pitch": camera.pitch},
         STEERING: {"speed": SPEED},

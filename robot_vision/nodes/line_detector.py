@@ -24,13 +24,13 @@ from robot_vision.ros.run import run_node
 
 LIBRARY_SETTINGS = (
     Setting("method", "trace", "how lines are found", choices=("trace", "hough")),
-    Setting("contrast", 6.0, "gradient at which a line may begin, grey levels a pixel", 0.1, 255.0),
-    Setting("edge_contrast", 3.0, "gradient at which an edge is followed, grey levels a pixel", 0.1, 255.0),
+    Setting("contrast", 10.0, "gradient at which a line may begin, grey levels a pixel", 0.1, 255.0),
+    Setting("edge_contrast", 5.0, "gradient at which an edge is followed, grey levels a pixel", 0.1, 255.0),
     Setting("faint", 0.45, "factor on both contrasts when too few lines are found; 1: none", 0.01, 1.0),
     Setting("enough", 120, "number of lines that makes a second look unnecessary", 0, 100_000),
     Setting("min_length", 15.0, "shortest line, px", 2.0, 10_000.0),
     Setting("max_gap", 4, "longest gap bridged along a line, px", 0, 1000),
-    Setting("blur", 1.0, "standard deviation of the blur before the gradient, px", 0.0, 10.0),
+    Setting("blur", 0.8, "standard deviation of the blur before the gradient, px", 0.0, 10.0),
     Setting("largest_area", 500_000, "larger pictures are searched at this size, px", 64, 100_000_000),
 )
 

@@ -317,15 +317,16 @@ class Simulator(VisionNode):
 def _made_drive(given: dict[str, Any]) -> LiveDrive:
     try:
         world = build_world(given["world"], given["seed"], split_settings(given["settings"]))
-        return LiveDrive(world, _live_settings(given), given["seed"])
+        return LiveDrive(world, _live_settings(given, world.drive.speed), given["seed"])
     except SimulationError as refusal:
         raise ParameterError(str(refusal)) from refusal
 
 
-def _live_settings(given: dict[str, Any]) -> LiveSettings:
+def _live_settings(given: dict[str, Any], usual_speed: float) -> LiveSettings:
+    able = VehicleSettings(kind=given["vehicle"], most_speed=max(3.0, 1.5 * usual_speed))
     return LiveSettings(
         rate=given["rate"],
-        vehicle=VehicleSettings(kind=given["vehicle"]),
+        vehicle=able,
         offset=given["start.offset"],
         yaw=given["start.yaw"],
         lean=given["lean"],

@@ -3,6 +3,7 @@
 
 from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.centres import CentreError, CentreFinder, Centres, TrueCentre
+from robot_vision.perception.crop_rows import CropRowDetector, RowPattern
 from robot_vision.perception.ellipse_detector import EllipseDetector, SeenEllipse
 from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
 from robot_vision.perception.lane import LaneHeading
@@ -20,6 +21,7 @@ __all__ = [
     "CentreError",
     "CentreFinder",
     "Centres",
+    "CropRowDetector",
     "EllipseDetector",
     "HeadingEstimate",
     "HeadingEstimator",
@@ -27,6 +29,7 @@ __all__ = [
     "LineDetector",
     "LineSegments",
     "Role",
+    "RowPattern",
     "SeenEllipse",
     "TrueCentre",
     "VanishingPointEstimator",

@@ -35,6 +35,13 @@ class Attitude:
     up_covariance: Array
     seen: bool
 
+    @classmethod
+    def from_angles(cls, roll: float, pitch: float, covariance: Array) -> Attitude:
+        """One that a picture told as roll and pitch (rad) with their covariance (2, 2)."""
+        up = up_from_attitude(roll, pitch)
+        jacobian = tangent_of_attitude(up, roll, pitch)
+        return cls(roll, pitch, covariance, up, jacobian @ covariance @ jacobian.T, True)
+
 
 def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     """The vertical that agrees best with the vertical vanishing point, the horizontal ones and the mounting.

@@ -49,13 +49,13 @@ class LineDetector:
     """
 
     method: Method = "trace"
-    contrast: float = 6.0
-    edge_contrast: float = 3.0
+    contrast: float = 10.0
+    edge_contrast: float = 5.0
     faint: float = 0.45
     enough: int = 120
     min_length: float = 15.0
     max_gap: int = 4
-    blur: float = 1.0
+    blur: float = 0.8
     largest_area: int = 500_000
     _finder: _Finder | None = field(default=None, init=False, repr=False, compare=False)
     _shape: tuple[int, ...] = field(default=(), init=False, repr=False, compare=False)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # mypy: allow-untyped-defs, allow-untyped-calls
-"""Straight lines traced along edges: walk from a strong edge point both ways while a running fit stays straight.
+"""Straight lines traced along edges: walk from a clear edge point both ways while a running fit stays straight.
 
 Each step looks at the three pixels ahead where the fitted line will pass and takes the edge point that lies closest
 to the line and whose gradient points the same way. When the edge bends, ends or turns its polarity, the walk ends
-and all points are fitted once more, robustly. One pass over the edge points, no parameter space: the cost follows
-the number of edge points. (Related: Topal and Akinlar 2012, EDLines; Suarez et al. 2022, ELSED.)
+and all points are fitted once more, robustly. One pass over the edge points in reading order, which keeps what the
+processor needs near at hand; no parameter space: the cost follows the number of edge points.
+(Related: Topal and Akinlar 2012, EDLines; Suarez et al. 2022, ELSED.)
 
 Kernels here are compiled by numba, which infers their types; import this module only where lines are about to
 be traced.
@@ -19,19 +20,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from robot_vision.perception.edges import CONTRAST, NORMAL_U, NORMAL_V, EdgeFinder, U, V
+from robot_vision.perception.edges import CONTRAST, FAST, NORMAL_U, NORMAL_V, EdgeFinder, U, V
 from robot_vision.perception.segments import LineSegments
 
 #: A traced line: u1 v1 u2 v2, standard deviation of the points about the line (px), gradient (grey levels a pixel).
 _LINE_COLUMNS = 6
 _MOST_LINES = 6000
-_BINS = 256
-_STRONGEST = 64.0
+#: Walks of fewer points trust the gradient more than where the points lie.
 _YOUNG = 6
-#: Walks shorter than this share of the shortest line are not tried again from their other points.
-_RETRY_SHARE = 0.6
-_SUMS = 9
-_S_U, _S_V, _S_UU, _S_UV, _S_VV, _S_NU, _S_NV, _S_C, _S_N = range(_SUMS)
+#: The fit hardly moves once it is long: from this many points on it is renewed at every fourth only.
+_SETTLED = 16
 
 
 class TraceSettings(NamedTuple):
@@ -54,6 +52,20 @@ class TraceSettings(NamedTuple):
     turn_cosine: float = 0.906
     distance: float = 1.0
     density: float = 0.7
+
+
+class _Sums(NamedTuple):
+    """What a running fit keeps of its points: sums of their places (from the seed), gradients and contrasts."""
+
+    n: float
+    u: float
+    v: float
+    uu: float
+    uv: float
+    vv: float
+    normal_u: float
+    normal_v: float
+    contrast: float
 
 
 class TraceFinder:
@@ -83,52 +95,71 @@ class TraceFinder:
         self._enough = enough
         self._lines = np.empty((_MOST_LINES, _LINE_COLUMNS), np.float64)
         self._members = np.empty(2 * sum(shape), np.int32)
-        self._taken = np.empty(shape[0] * shape[1] // 2 + 1, np.uint8)
-        self._order = np.empty(shape[0] * shape[1] // 2 + 1, np.int32)
+        self._taken = np.empty(shape[0] * shape[1], np.uint8)
 
     def find(self, gray: NDArray[np.uint8]) -> LineSegments:
-        """Segments of one picture, the strongest seeds first."""
+        """Segments of one picture, in the reading order of where they were met."""
         self._edges.look(gray)
         for level in self._levels:
             index, points = self._edges.find(level.edge_contrast)
-            taken, order = self._taken[: len(points)], self._order[: len(points)]
+            taken = self._taken[: len(points)]
             taken[:] = 0
-            _strongest_first(points, order)
-            count = _trace(index, points, order, taken, self._members, self._lines, 0, level)
+            count = _trace(index, points, taken, self._members, self._lines, level)
             if count >= self._enough:
                 break
         lines = self._lines[:count]
         return LineSegments(lines[:, :4].copy(), lines[:, 5].copy(), lines[:, 4].copy())
 
 
-@njit(cache=True)
-def _strongest_first(points, order):
-    """Counting sort of the edge points by falling contrast, in reading order among equals."""
-    start = np.zeros(_BINS + 1, np.int64)
-    bins = np.empty(len(points), np.uint8)
-    for i in range(len(points)):
-        level = min(points[i, CONTRAST] / _STRONGEST, 1.0)
-        bins[i] = np.uint8(round((1.0 - level) * (_BINS - 1)))
-        start[bins[i] + 1] += 1
-    for b in range(_BINS):
-        start[b + 1] += start[b]
-    for i in range(len(points)):
-        order[start[bins[i]]] = i
-        start[bins[i]] += 1
+@njit(**FAST)
+def _trace(index, points, taken, members, lines, level):
+    """Walk from every point that no walk has taken yet; returns the number of lines found."""
+    found = 0
+    for seed in range(len(points)):
+        if taken[seed] or points[seed, CONTRAST] < level.seed_contrast:
+            continue
+        taken[seed] = 1
+        members[0] = seed
+        u0, v0 = np.float64(points[seed, U]), np.float64(points[seed, V])
+        sums = _joined(_Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), points, seed, u0, v0)
+        count, sums = _walk(index, points, taken, members, 1, sums, u0, v0, 1.0, level)
+        count, sums = _walk(index, points, taken, members, count, sums, u0, v0, -1.0, level)
+        # A line may run through every other pixel of a diagonal only.
+        if count < 0.7 * level.density * level.min_length:
+            continue
+        if _fit(points, members[:count], sums, u0, v0, level, lines[found]):
+            found += 1
+            if found == len(lines):
+                break
+    return found
 
 
-@njit(cache=True, fastmath=True)
-def _direction(sums):
+@njit(**FAST)
+def _joined(sums, points, i, u0, v0):
+    """Sums with point i besides; the seed is at (u0, v0)."""
+    u, v = points[i, U] - u0, points[i, V] - v0
+    return _Sums(
+        sums.n + 1.0,
+        sums.u + u,
+        sums.v + v,
+        sums.uu + u * u,
+        sums.uv + u * v,
+        sums.vv + v * v,
+        sums.normal_u + points[i, NORMAL_U],
+        sums.normal_v + points[i, NORMAL_V],
+        sums.contrast + points[i, CONTRAST],
+    )
+
+
+@njit(**FAST)
+def _normal(sums):
     """Unit normal of the running fit, on the side of the mean gradient; young walks trust the gradient itself."""
-    n = sums[_S_N]
-    if n < _YOUNG:
-        size = np.sqrt(sums[_S_NU] ** 2 + sums[_S_NV] ** 2) + 1e-12
-        return sums[_S_NU] / size, sums[_S_NV] / size
-    mu = sums[_S_U] / n
-    mv = sums[_S_V] / n
+    if sums.n < _YOUNG:
+        size = np.sqrt(sums.normal_u**2 + sums.normal_v**2) + 1e-12
+        return sums.normal_u / size, sums.normal_v / size
     # Major axis of the 2x2 scatter without trigonometry, by the better conditioned of its two forms.
-    spread = (sums[_S_UU] - sums[_S_VV]) / n - mu * mu + mv * mv
-    mixed = 2.0 * (sums[_S_UV] / n - mu * mv)
+    spread = (sums.uu - sums.vv) * sums.n - sums.u * sums.u + sums.v * sums.v
+    mixed = 2.0 * (sums.uv * sums.n - sums.u * sums.v)
     whole = np.sqrt(spread * spread + mixed * mixed)
     if spread >= 0.0:
         tu, tv = whole + spread, mixed
@@ -136,104 +167,96 @@ def _direction(sums):
         tu, tv = mixed, whole - spread
     size = np.sqrt(tu * tu + tv * tv) + 1e-12
     nu, nv = -tv / size, tu / size
-    if nu * sums[_S_NU] + nv * sums[_S_NV] < 0.0:
+    if nu * sums.normal_u + nv * sums.normal_v < 0.0:
         nu, nv = -nu, -nv
     return nu, nv
 
 
-@njit(cache=True, fastmath=True)
-def _join(points, i, u0, v0, sums):
-    u = points[i, U] - u0
-    v = points[i, V] - v0
-    sums[_S_U] += u
-    sums[_S_V] += v
-    sums[_S_UU] += u * u
-    sums[_S_UV] += u * v
-    sums[_S_VV] += v * v
-    sums[_S_NU] += points[i, NORMAL_U]
-    sums[_S_NV] += points[i, NORMAL_V]
-    sums[_S_C] += points[i, CONTRAST]
-    sums[_S_N] += 1.0
+@njit(**FAST)
+def _walk(index, points, taken, members, count, sums, u0, v0, sense, level):
+    """Walk one way (sense +1 or -1 along the line) from the seed at (u0, v0); returns member count and sums.
 
-
-@njit(cache=True, fastmath=True)
-def _walk(index, points, taken, members, count, sums, seed, sense, level):
-    """Walk one way (sense +1 or -1 along the line) from the seed; returns the number of members."""
+    Between renewals of the fit each step depends on the picture only through the last column or row, so the
+    processor runs ahead.
+    """
     height, width = index.shape
-    u0 = np.float64(points[seed, U])
-    v0 = np.float64(points[seed, V])
-    # The last point taken, relative to the seed, and the pixel reached along the running axis.
-    at_u, at_v = 0.0, 0.0
+    nu, nv = _normal(sums)
+    base_u, base_v = u0 + sums.u / sums.n, v0 + sums.v / sums.n
+    if count < _YOUNG:
+        base_u, base_v = u0, v0
     column, row = int(u0 + 0.5), int(v0 + 0.5)
+    along_row, ahead, slope = _course(nu, nv, sense)
+    offset = base_u * nu + base_v * nv
     gap = 0
-    nu, nv = _direction(sums)
-    along_row = abs(nv) >= abs(nu)
     while count < len(members):
-        # Tangent with the brighter side on the left in the picture.
-        tu, tv = -nv * sense, nu * sense
-        if along_row != (abs(tu) >= abs(tv)):
-            along_row = not along_row
-            column, row = int(u0 + at_u + 0.5), int(v0 + at_v + 0.5)
-        if sums[_S_N] < _YOUNG:
-            base_u, base_v = at_u, at_v
-        else:
-            base_u, base_v = sums[_S_U] / sums[_S_N], sums[_S_V] / sums[_S_N]
         if along_row:
-            column += 1 if tu > 0.0 else -1
-            row = int(v0 + base_v + (column - u0 - base_u) * tv / tu + 0.5)
+            column += ahead
+            row = int(base_v + (column - base_u) * slope + 0.5)
         else:
-            row += 1 if tv > 0.0 else -1
-            column = int(u0 + base_u + (row - v0 - base_v) * tu / tv + 0.5)
+            row += ahead
+            column = int(base_u + (row - base_v) * slope + 0.5)
         if column < 1 or row < 1 or column >= width - 1 or row >= height - 1:
             break
         best = -1
-        closest = level.distance + (0.5 if sums[_S_N] < _YOUNG + 2 else 0.0)
+        closest = level.distance + (0.5 if count < _YOUNG + 2 else 0.0)
         for side in range(-1, 2):
             i = index[row + side, column] if along_row else index[row, column + side]
-            if i < 0 or taken[i] or points[i, CONTRAST] < level.edge_contrast:
+            if i < 0 or taken[i]:
                 continue
             if points[i, NORMAL_U] * nu + points[i, NORMAL_V] * nv < level.turn_cosine:
                 continue
-            away = abs((points[i, U] - u0 - base_u) * nu + (points[i, V] - v0 - base_v) * nv)
+            away = abs(points[i, U] * nu + points[i, V] * nv - offset)
             if away < closest:
                 closest = away
                 best = i
         if best < 0:
             gap += 1
-            if gap > level.max_gap or gap > 1 + count // 4:
+            if gap > level.max_gap or gap > count // 4:
                 break
             continue
         gap = 0
         members[count] = best
         count += 1
         taken[best] = 1
-        _join(points, best, u0, v0, sums)
-        at_u = points[best, U] - u0
-        at_v = points[best, V] - v0
-        # The fit hardly moves once it is long: renew it ever more seldom.
-        if count < 16 or count % 4 == 0:
-            nu, nv = _direction(sums)
-    return count
+        at_u, at_v = np.float64(points[best, U]), np.float64(points[best, V])
+        sums = _joined(sums, points, best, u0, v0)
+        if count < _SETTLED or count % 4 == 0:
+            nu, nv = _normal(sums)
+            base_u, base_v = at_u, at_v
+            if count >= _YOUNG:
+                base_u, base_v = u0 + sums.u / sums.n, v0 + sums.v / sums.n
+            offset = base_u * nu + base_v * nv
+            if along_row != (abs(nv) >= abs(nu)):
+                column, row = int(at_u + 0.5), int(at_v + 0.5)
+            along_row, ahead, slope = _course(nu, nv, sense)
+    return count, sums
 
 
-@njit(cache=True, fastmath=True)
-def _fit(points, members, count, sums, seed, level, line):
+@njit(**FAST)
+def _course(nu, nv, sense):
+    """Whether the way across normal (nu, nv) steps along rows, by +1 or -1 a step, and its slope across them.
+
+    Walked in the positive sense it has the brighter side on the left in the picture.
+    """
+    if abs(nv) >= abs(nu):
+        return True, (1 if -nv * sense > 0.0 else -1), -nu / nv
+    return False, (1 if nu * sense > 0.0 else -1), -nv / nu
+
+
+@njit(**FAST)
+def _fit(points, members, sums, u0, v0, level, line):
     """Robust line through the members: least squares across the line with Cauchy weights; False when refused."""
-    u0 = np.float64(points[seed, U])
-    v0 = np.float64(points[seed, V])
-    n = sums[_S_N]
-    mu, mv = u0 + sums[_S_U] / n, v0 + sums[_S_V] / n
-    nu, nv = _direction(sums)
+    n = sums.n
+    mu, mv = u0 + sums.u / n, v0 + sums.v / n
+    nu, nv = _normal(sums)
     tu, tv = -nv, nu
     shift, slope = 0.0, 0.0
     scale = 0.4
     for _ in range(3):
         w0 = w1 = w2 = d0 = d1 = 0.0
-        for k in range(count):
-            u = points[members[k], U] - mu
-            v = points[members[k], V] - mv
-            t = u * tu + v * tv
-            d = u * nu + v * nv
+        for i in members:
+            u, v = points[i, U] - mu, points[i, V] - mv
+            t, d = u * tu + v * tv, u * nu + v * nv
             r = (d - shift - slope * t) / scale
             w = 1.0 / (1.0 + r * r)
             w0 += w
@@ -248,9 +271,8 @@ def _fit(points, members, count, sums, seed, level, line):
         slope = (w0 * d1 - w1 * d0) / determinant
         scale = 0.3
     first, last, square, near = 1e9, -1e9, 0.0, 0
-    for k in range(count):
-        u = points[members[k], U] - mu
-        v = points[members[k], V] - mv
+    for i in members:
+        u, v = points[i, U] - mu, points[i, V] - mv
         t = u * tu + v * tv
         d = u * nu + v * nv - shift - slope * t
         if abs(d) > 1.2:
@@ -266,31 +288,5 @@ def _fit(points, members, count, sums, seed, level, line):
         line[2 * end] = mu + t * tu + (shift + slope * t) * nu
         line[2 * end + 1] = mv + t * tv + (shift + slope * t) * nv
     line[4] = np.sqrt(square / near)
-    line[5] = sums[_S_C] / n
+    line[5] = sums.contrast / n
     return True
-
-
-@njit(cache=True, fastmath=True)
-def _trace(index, points, order, taken, members, lines, found, level):
-    sums = np.empty(_SUMS)
-    for o in range(len(order)):
-        seed = order[o]
-        if points[seed, CONTRAST] < level.seed_contrast - _STRONGEST / _BINS or found == len(lines):
-            break
-        if taken[seed] or points[seed, CONTRAST] < level.seed_contrast:
-            continue
-        sums[:] = 0.0
-        taken[seed] = 1
-        members[0] = seed
-        _join(points, seed, np.float64(points[seed, U]), np.float64(points[seed, V]), sums)
-        count = _walk(index, points, taken, members, 1, sums, seed, 1.0, level)
-        count = _walk(index, points, taken, members, count, sums, seed, -1.0, level)
-        kept = count >= level.density * level.min_length * 0.7
-        kept = kept and _fit(points, members, count, sums, seed, level, lines[found])
-        if kept:
-            found += 1
-        elif count >= _RETRY_SHARE * level.min_length:
-            # A long walk that failed began badly: its points may yet make a line from another seed.
-            for k in range(1, count):
-                taken[members[k]] = 0
-    return found

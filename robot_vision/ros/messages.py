@@ -205,27 +205,10 @@ def attitude_to_message(header: Header, attitude: Attitude) -> Imu:
     return message
 
 
-def straight_path(header: Header, lane: LaneHeading, length: float, step: float = 0.5) -> Path:
-    """Build `path_ahead`: the straight centre line of the lane, in base_link.
-
-    Args:
-        header: of the picture; its stamp is kept.
-        lane: with a known offset.
-        length: of the line, from the point nearest to the robot, m.
-        step: between its points, m.
-    """
-    way = np.arange(0.0, length + 0.5 * step, step)
-    sine, cosine = math.sin(lane.yaw), math.cos(lane.yaw)
-    # the lane lies at -yaw seen from the robot; its nearest point is `offset` to the right of it
-    x = way * cosine - lane.offset * sine
-    y = -way * sine - lane.offset * cosine
-    return path_to_message(header, np.column_stack([x, y]))
-
-
-def path_to_message(header: Header, points: ArrayLike) -> Path:
-    """Build a Path in base_link through (N, 2) points (m), each turned towards the next."""
-    xy = np.asarray(points, np.float64)
-    own = Header(stamp=header.stamp, frame_id="base_link")
+def path_to_message(header: Header, points: ArrayLike, frame: str = "base_link") -> Path:
+    """Build a Path in a frame through (N, 2) points (m), each turned towards the next."""
+    xy = np.asarray(points, np.float64).reshape(-1, 2)
+    own = Header(stamp=header.stamp, frame_id=frame)
     along = np.diff(xy, axis=0, append=xy[-1:] + (xy[-1:] - xy[-2:-1]))
     message = Path(header=own)
     for (x, y), (dx, dy) in zip(xy.tolist(), along.tolist(), strict=True):
@@ -233,6 +216,22 @@ def path_to_message(header: Header, points: ArrayLike) -> Path:
         pose.position.x, pose.position.y = x, y
         message.poses.append(PoseStamped(header=own, pose=pose))
     return message
+
+
+def path_from_message(message: Path) -> NDArray[np.float64]:
+    """Read the points (N, 2) of a Path in base_link, m.
+
+    Raises:
+        MessageError: it is in another frame, or a number is not finite.
+    """
+    if message.header.frame_id != "base_link":
+        raise MessageError(f"the path is in the frame {message.header.frame_id!r}; base_link is understood")
+    places = [pose.pose.position for pose in message.poses]
+    points = np.array([(place.x, place.y) for place in places], np.float64).reshape(-1, 2)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise MessageError(f"point {bad[0]} of the path is {points[bad[0]].tolist()}")
+    return points
 
 
 def steering_to_message(header: Header, speed: float, turn_rate: float) -> TwistStamped:

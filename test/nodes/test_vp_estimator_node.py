@@ -217,3 +217,39 @@ def test_without_the_camera_height_the_offset_is_marked_unknown(calibrated: Node
     assert calibrated.set_parameter("camera.height", HEIGHT_M).successful
     header = drive(calibrated, 0.1, 0.3)
     assert heading_from_message(calibrated.answer("heading", header)).offset == pytest.approx(0.3, abs=0.02)
+
+
+def painted_road(yaw: float, offset: float) -> LineSegments:
+    """Both edges of two painted lines 5 m apart as a robot sees them, the paint brighter than the road."""
+    ends = []
+    for place in (2.56, 2.44, -2.44, -2.56):
+        bright_left = place in (2.44, -2.56)
+        for near in (2.5, 5.0, 7.5, 10.0, 12.5):
+            piece = [(near, place, 0.0), (near + 2.5, place, 0.0)]
+            ends.append(piece if bright_left else piece[::-1])
+    points = np.array(ends).reshape(-1, 3) - (0.0, offset, HEIGHT_M)
+    base = points @ rotation_from_rpy(0.0, 0.0, yaw)
+    pixels = CAMERA.pixels(base @ CAMERA.optical_to_base).reshape(-1, 4)
+    inside = ((pixels >= 0) & (pixels <= np.tile([639, 479], 2))).all(axis=1)
+    return LineSegments.from_endpoints(pixels[inside])
+
+
+def test_a_road_is_said_in_its_own_frame_with_the_path_along_it(calibrated: NodeBench) -> None:
+    assert calibrated.set_parameter("way", "road").successful
+    assert calibrated.set_parameter("lane.widest", 9.0).successful
+    calibrated.next_stamp(-900_000_000)
+    for _ in range(8):
+        header = send(calibrated, painted_road(0.05, -0.4))
+    message = calibrated.answer("heading", header)
+    assert message.header.frame_id == "road"
+    lane = heading_from_message(message)
+    assert (lane.yaw, lane.offset) == pytest.approx((0.05, -0.4), abs=0.05)
+    path = calibrated.answer("path_ahead", header)
+    points = np.array([(pose.pose.position.x, pose.pose.position.y) for pose in path.poses])
+    on_road = points @ rotation_from_rpy(0.0, 0.0, 0.05)[:2, :2].T + (0.0, -0.4)
+    np.testing.assert_allclose(on_road[:, 1], 0.0, atol=0.3)
+    points = points_from_cloud(calibrated.answer("vanishing_points", header), ("u", "role"))
+    assert points["role"].tolist()[0] == 1 and len(points) >= 2
+    header = send(calibrated, LineSegments.empty())
+    calibrated.until(lambda: "no road" in calibrated.state("message"), "it says that there is none")
+    assert calibrated.set_parameter("way", "auto").successful

@@ -345,7 +345,7 @@ def test_a_gap_is_bridged_when_it_is_small_enough():
         ("contrast", math.nan),
         ("contrast", math.inf),
         ("edge_contrast", -1.0),
-        ("edge_contrast", 7.0),
+        ("edge_contrast", 11.0),
         ("min_length", 0.0),
         ("faint", 0.0),
         ("faint", 1.5),

@@ -20,6 +20,7 @@ from std_msgs.msg import Header
 from robot_vision.geometry import Camera
 from robot_vision.perception import LaneHeading, LineSegments, Role, VanishingPoints
 from robot_vision.perception.attitude import Attitude
+from robot_vision.perception.way import straight_path
 from robot_vision.ros import messages
 from robot_vision.ros.messages import MessageError, lines_from_message, lines_to_message
 
@@ -214,13 +215,25 @@ def test_heading_that_is_nothing_to_steer_by_is_refused() -> None:
 @given(st.floats(-1.2, 1.2), st.floats(-3.0, 3.0))
 def test_path_ahead_lies_on_the_centre_line(yaw: float, offset: float) -> None:
     """Moved from base_link to the lane's frame by the robot's own pose, every point has y = 0."""
-    path = messages.straight_path(HEADER, LaneHeading(yaw, 1e-4, offset, 1e-4), length=5.0)
+    points = straight_path(LaneHeading(yaw, 1e-4, offset, 1e-4), length=5.0)
+    path = messages.path_to_message(HEADER, points)
+    np.testing.assert_allclose(messages.path_from_message(path), points)
     x, y = np.array([(pose.pose.position.x, pose.pose.position.y) for pose in path.poses]).T
     in_lane_x = math.cos(yaw) * x - math.sin(yaw) * y
     in_lane_y = math.sin(yaw) * x + math.cos(yaw) * y + offset
     np.testing.assert_allclose(in_lane_y, 0.0, atol=1e-9)
     assert in_lane_x[-1] - in_lane_x[0] == pytest.approx(5.0)
     assert (path.header.frame_id, path.header.stamp) == ("base_link", HEADER.stamp)
+
+
+def test_a_path_elsewhere_or_nowhere_is_refused() -> None:
+    path = messages.path_to_message(HEADER, [(0.0, 0.0), (1.0, 0.5)])
+    path.poses[1].pose.position.y = math.nan
+    with pytest.raises(MessageError, match="point 1"):
+        messages.path_from_message(path)
+    path.header.frame_id = "map"
+    with pytest.raises(MessageError, match="map"):
+        messages.path_from_message(path)
 
 
 def test_attitude_marks_what_a_camera_cannot_tell() -> None:

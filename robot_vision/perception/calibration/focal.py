@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from robot_vision.geometry.sphere import EqualAreaCells, cross
 from robot_vision.perception.calibration.robust import block_sigma, student_weights
 from robot_vision.perception.vanishing.bundle import Bundle
-from robot_vision.perception.vanishing.focal import PRIOR_SIGMA, find_focal_length
-from robot_vision.perception.vanishing.frames import orthogonal_frames
-from robot_vision.perception.vanishing.refit import refit_frame, rotation_about
+from robot_vision.perception.vanishing.focal import PRIOR_SIGMA, SHARED_ERROR, find_focal_length
+from robot_vision.perception.vanishing.frames import best_frame
+from robot_vision.perception.vanishing.refit import rotation_about
 from robot_vision.perception.vanishing.support import assignment, false_alarms
 from robot_vision.perception.vanishing.votes import proposals
 
@@ -32,11 +32,9 @@ Progress = Callable[[int], None]
 #: walls of a town are quite at right angles. Measured on pictures of towns with a known camera.
 _SCATTER = 0.03
 #: Pictures less sure than this (sd of the logarithm) hardly tell anything and are not counted.
-_TELLING = 0.2
+_TELLING = 0.3
 #: How near (logarithm) to the common answer a picture must come to agree with it, besides its own error.
 _NEAR = 0.08
-#: Lines share their errors: factor on the standard deviation, as for one picture by itself.
-_SHARED_ERROR = 3.0
 _CERTAINTY = 0.01
 _LARGEST_STEP = 0.1
 _GRID = np.linspace(-1.0, 1.4, 1201)
@@ -135,16 +133,18 @@ def _alone(bundle: Bundle, cells: EqualAreaCells) -> tuple[float, float]:
     if _believed(scaled, found.frame).sum() < 2 or not found.sigma < _TELLING:
         return nothing
     # What the picture says itself, without the prior that kept it from running away.
-    shrunk = 1.0 - (found.sigma / PRIOR_SIGMA) ** 2 / _SHARED_ERROR**2
+    shrunk = 1.0 - (found.sigma / PRIOR_SIGMA) ** 2 / SHARED_ERROR**2
     log_ratio = np.log(found.ratio) / shrunk
     return float(np.exp(log_ratio)), found.sigma
 
 
 def _believed(bundle: Bundle, frame: Array) -> NDArray[np.bool_]:
     """Which rows of a frame have lines enough of their own not to be chance."""
-    nearest, _ = assignment(bundle.residuals(frame))
+    residuals = bundle.residuals(frame)
+    nearest, _ = assignment(residuals)
     pairs = 0.5 * len(bundle) ** 2
-    return np.array([false_alarms(bundle, nearest == k, 2, pairs) < _CERTAINTY for k in range(3)])
+    free = [(nearest == k) | (nearest < 0) for k in range(3)]
+    return np.array([false_alarms(bundle, residuals[k], free[k], 2, pairs) < _CERTAINTY for k in range(3)])
 
 
 def _most_agreed(logs: Array, sigma: Array) -> float:
@@ -164,8 +164,7 @@ def _view(bundle: Bundle, cells: EqualAreaCells, ratio: float) -> _View | None:
     proposed = proposals(scaled, cells, _VOTERS, _CANDIDATES)
     if not len(proposed):
         return None
-    frames, score = orthogonal_frames(scaled, proposed)
-    frame = refit_frame(scaled, frames[int(np.argmax(score))])
+    frame = best_frame(scaled, proposed)
     believed = _believed(scaled, frame)
     if believed.sum() < 2:
         return None
@@ -223,7 +222,7 @@ def _opinion(view: _View, ratio: float, rounds: int = 4) -> _Opinion:
         -float(weight * free @ _opened(members, first, second, nearest, lines, scale)) / information
         for first, second in ((0, 1), (0, 2), (1, 2))
     ]
-    return _Opinion(shift, _SHARED_ERROR**2 / information, np.array(leaning))
+    return _Opinion(shift, SHARED_ERROR**2 / information, np.array(leaning))
 
 
 def _opened(

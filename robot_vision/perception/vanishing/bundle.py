@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 #: of real walls and kerbs are not straighter than that. Both measured on pictures with known vanishing points.
 END_SIGMA = 0.6
 DIRECTION_SIGMA = np.deg2rad(0.35)
+#: A vanishing point this near the middle of a line, in half lengths, lies within it, whatever the ends may be off by.
+WITHIN = 0.8
+#: A line that does not tell its contrast still counts, grey levels a pixel.
+_LEAST_CONTRAST = 0.1
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Bundle:
         middles: (N, 2) midpoints.
         halves: (N,) half lengths.
         sigma: (N,) standard deviation of the direction, rad.
-        weight: (N,) root of the length, mean 1.
+        weight: (N,) root of length times contrast, mean 1: long clear edges are seldom clutter.
         source: (N,) index of the line in the segments given.
     """
 
@@ -55,7 +59,8 @@ class Bundle:
         halves = 0.5 * np.hypot(tangent[:, 0], tangent[:, 1])
         tangent = tangent / (2.0 * halves)[:, None] if len(source) else tangent
         offset = tangent[:, 0] * middles[:, 1] - tangent[:, 1] * middles[:, 0]
-        root = np.sqrt(lengths)
+        contrast = np.maximum(np.nan_to_num(segments.strength[source]), _LEAST_CONTRAST)
+        root = np.sqrt(lengths * contrast)
         return cls(
             lines=np.column_stack([tangent[:, 1], -tangent[:, 0], offset]),
             middles=middles,
@@ -93,17 +98,20 @@ class Bundle:
         """Length of the lever by which a direction turns each line about its midpoint: (K, 3) -> (K, N).
 
         It is the distance from the midpoint to the vanishing point times the direction's depth, so that it stays
-        finite at infinity. A vanishing point cannot lie within a line that leads to it: no lever is shorter than
-        half the line.
+        finite at infinity. A line that contains a vanishing point does not lead to it: its lever is 0.
         """
         depth = np.abs(directions[:, 2:])
         across = directions[:, :1] - directions[:, 2:] * self.middles[:, 0]
         down = directions[:, 1:2] - directions[:, 2:] * self.middles[:, 1]
-        return np.asarray(np.maximum(np.hypot(across, down), depth * self.halves) + 1e-9)
+        lever = np.hypot(across, down)
+        return np.asarray(np.where(lever > WITHIN * depth * self.halves, lever, 0.0))
 
     def residuals(self, directions: Array) -> Array:
         """Angle between each line and the way from its midpoint to each vanishing point, in standard deviations.
 
-        (K, 3) unit directions -> (K, N); the sine stands for the angle.
+        (K, 3) unit directions -> (K, N); the sine stands for the angle, infinity for a line without a lever.
         """
-        return np.asarray((directions @ self.lines.T) / (self.reach(directions) * self.sigma))
+        lever = self.reach(directions)
+        none = lever == 0.0
+        angles = (directions @ self.lines.T) / (np.where(none, 1.0, lever) * self.sigma)
+        return np.asarray(np.where(none, np.inf, angles))

@@ -13,9 +13,9 @@ from robot_vision.geometry.sphere import EqualAreaCells, angle_between, front_ha
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing.bundle import Bundle
 from robot_vision.perception.vanishing.focal import PRIOR_SIGMA, find_focal_length
-from robot_vision.perception.vanishing.frames import orthogonal_frames
+from robot_vision.perception.vanishing.frames import best_frame
 from robot_vision.perception.vanishing.points import VanishingPoints
-from robot_vision.perception.vanishing.refit import SHARED_ERROR, refit_each, refit_frame
+from robot_vision.perception.vanishing.refit import refit_each
 from robot_vision.perception.vanishing.roles import primary_first, roles
 from robot_vision.perception.vanishing.support import agreement, assignment, false_alarms
 from robot_vision.perception.vanishing.votes import proposals
@@ -33,9 +33,9 @@ class VanishingPointEstimator:
     """Finds vanishing points on the Gaussian sphere, with a focal length if none is known.
 
     1. Pairs of the longest lines vote into cells of equal area; the fullest cells are proposals.
-    2. About every proposal one vote of all lines gives its two orthogonal partners; the best frame is turned to
-       its lines. A scene need not be built at right angles: a member of the frame stays only if its own lines say
-       so, or if the other two do.
+    2. About every proposal one vote of all lines gives its two orthogonal partners; the few best frames are turned
+       to their lines, and the one they support most is kept. A scene need not be built at right angles: a member of
+       the frame stays only if its own lines say so, or if the other two do.
     3. Each member is refitted to its own lines, held to the frame by a soft spring.
     4. Lines left over propose further vanishing points, until what is left is clutter.
 
@@ -54,8 +54,8 @@ class VanishingPointEstimator:
 
     cell: float = float(np.deg2rad(3.0))
     voters: int = 60
-    candidates: int = 8
-    most_lines: int = 300
+    candidates: int = 12
+    most_lines: int = 400
     orthogonality: float = float(np.deg2rad(1.0))
     certainty: float = 0.01
     least_share: float = 0.2
@@ -93,6 +93,8 @@ class VanishingPointEstimator:
             bundle, camera, focal_sigma, directions, covariance = self._members_and_focal_length(
                 bundle, camera
             )
+        if ahead is not None:
+            directions, covariance = self._add_expected(bundle, directions, covariance, ahead)
         members = len(directions)
         directions, covariance = self._add_others(bundle, directions, covariance)
         return self._answer(bundle, directions, covariance, members, camera, len(lines), focal_sigma, ahead)
@@ -130,24 +132,46 @@ class VanishingPointEstimator:
             return None
         if ahead is not None:
             proposed = np.concatenate([ahead[None], proposed])
-        frames, score = orthogonal_frames(bundle, proposed)
-        return refit_frame(bundle, frames[int(np.argmax(score))])
+        return best_frame(bundle, proposed)
 
     def _members(self, bundle: Bundle, frame: Array | None) -> tuple[Array, Array]:
         """Members of the frame that are believed, each refitted: (M, 3) and covariance (M, 2, 2)."""
         if frame is None:
             return np.zeros((0, 3)), np.zeros((0, 2, 2))
-        directions, information = refit_each(bundle, frame, self.orthogonality)
-        nearest, support = assignment(bundle.residuals(directions))
+        directions, covariance = refit_each(bundle, frame, self.orthogonality)
+        residuals = bundle.residuals(directions)
+        nearest, _ = assignment(residuals)
         pairs = 0.5 * len(bundle) ** 2
         believed = np.array(
-            [false_alarms(bundle, nearest == k, _LINES_A_POINT, pairs) < self.certainty for k in range(3)]
+            [
+                false_alarms(bundle, residuals[k], (nearest == k) | (nearest < 0), _LINES_A_POINT, pairs)
+                < self.certainty
+                for k in range(3)
+            ]
         )
         if believed.sum() >= 2:
             believed[:] = True
-        spring = np.eye(2) / self.orthogonality**2
-        covariance = SHARED_ERROR * np.linalg.inv(information + spring)
         return directions[believed], covariance[believed]
+
+    def _add_expected(
+        self, bundle: Bundle, directions: Array, covariance: Array, ahead: Array
+    ) -> tuple[Array, Array]:
+        """The direction earlier pictures lead to expect, unless it is there or nothing speaks for it.
+
+        One direction named beforehand is one test, not one of all pairs of lines: few lines confirm it.
+        """
+        if len(directions) and angle_between(directions, ahead).min() < self.cell:
+            return directions, covariance
+        free = np.ones(len(bundle), bool)
+        if len(directions):
+            free = assignment(bundle.residuals(directions))[0] < 0
+        rest = bundle[free]
+        found, sure = refit_each(rest, ahead[None], self.orthogonality)
+        residuals = rest.residuals(found)[0]
+        few = (agreement(residuals) > 0.0).sum() < _FEWEST_LINES
+        if few or false_alarms(rest, residuals, np.ones(len(rest), bool), 0, 1.0) >= self.certainty:
+            return directions, covariance
+        return np.concatenate([directions, found]), np.concatenate([covariance, sure])
 
     def _add_others(self, bundle: Bundle, directions: Array, covariance: Array) -> tuple[Array, Array]:
         """Further vanishing points among the lines left over, until what is left is clutter."""
@@ -163,9 +187,10 @@ class VanishingPointEstimator:
                 break
             support = agreement(rest.residuals(proposed)) @ rest.weight
             best = proposed[[int(np.argmax(support))]]
-            found, information = refit_each(rest, best, 2.0 * self.cell)
-            support = agreement(rest.residuals(found))[0]
-            certain = false_alarms(rest, support > 0.0, _LINES_A_POINT, 0.5 * len(rest) ** 2) < self.certainty
+            found, sure = refit_each(rest, best, 2.0 * self.cell)
+            residuals, all_free = rest.residuals(found)[0], np.ones(len(rest), bool)
+            support, pairs = agreement(residuals), 0.5 * len(rest) ** 2
+            certain = false_alarms(rest, residuals, all_free, _LINES_A_POINT, pairs) < self.certainty
             certain &= float(support @ rest.weight) > max(
                 self.least_support, self.least_share * float(rest.weight.sum())
             )
@@ -173,7 +198,7 @@ class VanishingPointEstimator:
             if not certain or near:
                 break
             directions = np.concatenate([directions, found])
-            covariance = np.concatenate([covariance, SHARED_ERROR * np.linalg.inv(information + np.eye(2))])
+            covariance = np.concatenate([covariance, sure])
         return directions, covariance
 
     def _answer(

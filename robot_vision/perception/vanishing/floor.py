@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing.bundle import Bundle
 from robot_vision.perception.vanishing.points import Role, VanishingPoints
-from robot_vision.perception.vanishing.refit import SHARED_ERROR, refit_each
+from robot_vision.perception.vanishing.refit import refit_each
 
 Array = NDArray[np.float64]
 
@@ -45,8 +45,8 @@ def led_by_the_floor(points: VanishingPoints, lines: LineSegments) -> VanishingP
     weight = bundle.weight * np.where(below, _FLOOR_WEIGHT, 1.0)
     # Weights say whom to believe, not how many lines there are: their sum stays what it was.
     weight *= bundle.weight.sum() / weight.sum()
-    refitted, information = refit_each(replace(bundle, weight=weight), points.directions[[primary]], _SPRING)
+    refitted, sure = refit_each(replace(bundle, weight=weight), points.directions[[primary]], _SPRING)
     directions, covariance = points.directions.copy(), points.covariance.copy()
     directions[primary] = refitted[0]
-    covariance[primary] = SHARED_ERROR * np.linalg.inv(information[0] + np.eye(2) / _SPRING**2)
+    covariance[primary] = sure[0]
     return replace(points, directions=directions, covariance=covariance)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.geometry.sphere import EqualAreaCells, cross
+from robot_vision.geometry.sphere import EqualAreaCells
 from robot_vision.perception.vanishing.bundle import Bundle
-from robot_vision.perception.vanishing.frames import orthogonal_frames
-from robot_vision.perception.vanishing.refit import rotation_about
-from robot_vision.perception.vanishing.support import TOLERANCE, assignment
+from robot_vision.perception.vanishing.frames import different_frames, orthogonal_frames
+from robot_vision.perception.vanishing.support import TOLERANCE
 from robot_vision.perception.vanishing.votes import proposals
 
 Array = NDArray[np.float64]
@@ -23,11 +22,10 @@ RATIOS = np.exp(np.linspace(np.log(0.55), np.log(2.2), 9))
 #: Spread of focal lengths of ordinary cameras about the one assumed, as standard deviation of the logarithm.
 PRIOR_SIGMA = 0.35
 #: Support that one squared standard deviation of the prior outweighs, in mean lines.
-_PRIOR_PRICE = 4.0
+_PRIOR_PRICE = 6.0
 #: Lines share their errors, and no scene is quite rectangular: factor on the standard deviation, from real towns.
-_SHARED_ERROR = 3.0
+SHARED_ERROR = 4.5
 _FRAMES_A_RATIO = 2
-_FRAMES_REFITTED = 5
 
 
 @dataclass(frozen=True)
@@ -56,21 +54,15 @@ def find_focal_length(
         voters: number of lines whose pairs vote at each focal length tried.
         candidates: proposals examined at each focal length tried.
     """
-    starts: list[tuple[float, float, Array]] = []
+    found: list[tuple[float, FocalLength]] = []
     for ratio in RATIOS:
         scaled = bundle.at_focal_ratio(float(ratio))
         proposed = proposals(scaled, cells, voters, candidates)
-        if not len(proposed):
-            continue
-        frames, score = orthogonal_frames(scaled, proposed)
-        for k in np.argsort(-score, kind="stable")[:_FRAMES_A_RATIO]:
-            starts.append((float(score[k]) - _price(ratio), float(ratio), frames[k]))
-    if not starts:
-        return None
-    starts.sort(key=lambda start: -start[0])
-    refitted = [_refit(bundle, frame, ratio) for _, ratio, frame in starts[:_FRAMES_REFITTED]]
-    best = max(refitted, key=lambda outcome: outcome[0])
-    return best[1]
+        if len(proposed):
+            frames, score = orthogonal_frames(scaled, proposed)
+            best = different_frames(frames, score, _FRAMES_A_RATIO)
+            found += [_refit(bundle, frames[k], float(ratio)) for k in best]
+    return max(found, key=lambda outcome: outcome[0])[1] if found else None
 
 
 def _price(ratio: float) -> float:
@@ -78,29 +70,14 @@ def _price(ratio: float) -> float:
 
 
 def _refit(bundle: Bundle, frame: Array, ratio: float, rounds: int = 12) -> tuple[float, FocalLength]:
-    """Gauss-Newton on the rotation of the frame and the logarithm of the focal length together."""
-    prior = 2.0 * _PRIOR_PRICE / PRIOR_SIGMA**2 / TOLERANCE**2
-    for turn in range(rounds + 1):
-        scaled = bundle.at_focal_ratio(ratio)
-        residuals = scaled.residuals(frame)
-        nearest, support = assignment(residuals, TOLERANCE * (2.0 if turn < 2 else 1.0))
-        each = np.arange(len(bundle))
-        residual, own = residuals[nearest, each], frame[nearest]
-        scale = 1.0 / (scaled.reach(frame)[nearest, each] * scaled.sigma)
-        # Of the line (a, b, c / ratio) only the last part moves with the focal length.
-        by_focal = -scale * scaled.lines[:, 2] * own[:, 2]
-        jacobian = np.column_stack([scale[:, None] * cross(own, scaled.lines), by_focal])
-        weighted = (bundle.weight * support)[:, None] * jacobian
-        information = jacobian.T @ weighted + np.diag([1e-6, 1e-6, 1e-6, prior])
-        if turn == rounds:
-            break
-        pull = weighted.T @ residual + np.array([0.0, 0.0, 0.0, prior * np.log(ratio)])
-        step = -np.linalg.solve(information, pull)
-        angle = float(np.linalg.norm(step[:3]))
-        frame = frame @ rotation_about(step[:3] * min(1.0, 0.1 / max(angle, 1e-12))).T
-        ratio *= float(np.exp(np.clip(step[3], -0.15, 0.15)))
-        if turn > 2 and angle < 1e-5 and abs(step[3]) < 1e-5:
-            break
-    score = float(bundle.weight @ support) - _price(ratio)
-    sigma = _SHARED_ERROR * float(np.sqrt(np.linalg.inv(information)[3, 3]))
-    return score, FocalLength(ratio, min(sigma, PRIOR_SIGMA), frame)
+    """Turn the frame and stretch the focal length together; with the score of both."""
+    from robot_vision.perception.vanishing import focal_kernels
+
+    turned = np.array(frame, dtype=np.float64)
+    # Two prices of a squared deviation, in the currency of squared residuals: support falls by their square over T^2.
+    stiffness = 2.0 * _PRIOR_PRICE / PRIOR_SIGMA**2 / TOLERANCE**2
+    ratio, information, support = focal_kernels.turn_frame_and_stretch(
+        *bundle.arrays, turned, ratio, stiffness, TOLERANCE, rounds
+    )
+    sigma = min(SHARED_ERROR / float(np.sqrt(information)), PRIOR_SIGMA)
+    return float(support) - _price(ratio), FocalLength(float(ratio), sigma, turned)

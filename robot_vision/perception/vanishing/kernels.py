@@ -13,20 +13,25 @@ import math
 import numpy as np
 from numba import njit
 
+from robot_vision.perception.vanishing.bundle import WITHIN
+
+#: Division by zero gives inf, as in numpy.
+FAST = {"cache": True, "error_model": "numpy"}
 _LARGEST_TURN = 0.1
 _CONVERGED = 3e-5
 #: The first rounds look twice as far for lines, so that a frame off by a cell's width finds them.
 _WIDE_ROUNDS = 2
 
 
-@njit(cache=True)
+@njit(**FAST)
 def reach(lines, middles, halves, i, x, y, z):
-    """Lever of line i for the direction (x, y, z); see `Bundle.reach`."""
-    lever = math.hypot(x - z * middles[i, 0], y - z * middles[i, 1])
-    return max(lever, abs(z) * halves[i]) + 1e-9
+    """Lever of line i for the direction (x, y, z), infinitely short where the line contains it; see `Bundle.reach`."""
+    across, down = x - z * middles[i, 0], y - z * middles[i, 1]
+    lever = math.sqrt(across * across + down * down)
+    return lever if lever > WITHIN * abs(z) * halves[i] else 0.0
 
 
-@njit(cache=True)
+@njit(**FAST)
 def assign(lines, middles, halves, sigma, directions, tolerance, nearest, support, residual, levers):
     """For each line the direction it fits best (-1: none), its support, residual (sd) and lever for it."""
     for i in range(len(lines)):
@@ -36,6 +41,8 @@ def assign(lines, middles, halves, sigma, directions, tolerance, nearest, suppor
         for k in range(len(directions)):
             x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
             lever = reach(lines, middles, halves, i, x, y, z)
+            if lever == 0.0:
+                continue
             r = (lines[i, 0] * x + lines[i, 1] * y + lines[i, 2] * z) / (lever * sigma[i])
             if abs(r) < best:
                 best = abs(r)
@@ -46,9 +53,9 @@ def assign(lines, middles, halves, sigma, directions, tolerance, nearest, suppor
             support[i] = 1.0 - (best / tolerance) ** 2
 
 
-@njit(cache=True)
+@njit(**FAST)
 def turn_frame(lines, middles, halves, sigma, weight, frame, tolerance, rounds):
-    """Gauss-Newton on the rotation of an orthogonal frame (3, 3), rows turned in place.
+    """Gauss-Newton on the rotation of an orthogonal frame (3, 3), rows turned in place; returns its support.
 
     Turning by a small vector w moves a direction v by w x v, and l . (w x v) = w . (v x l).
     """
@@ -78,17 +85,19 @@ def turn_frame(lines, middles, halves, sigma, weight, frame, tolerance, rounds):
                     h[a, b] += w * j[a] * j[b]
         for a in range(3):
             h[a, a] += 1e-6
-        _solve3(h, g, j)
+        solve3(h, g, j)
         angle = math.sqrt(j[0] ** 2 + j[1] ** 2 + j[2] ** 2)
         if angle < 1e-12:
             break
-        _turn(frame, j[0] / angle, j[1] / angle, j[2] / angle, -min(angle, _LARGEST_TURN))
+        turn_about(frame, j[0] / angle, j[1] / angle, j[2] / angle, -min(angle, _LARGEST_TURN))
         if angle < _CONVERGED and turn > _WIDE_ROUNDS:
             break
+    assign(lines, middles, halves, sigma, frame, tolerance, nearest, support, residual, levers)
+    return (weight * support).sum()
 
 
-@njit(cache=True)
-def _solve3(h, g, x):
+@njit(**FAST)
+def solve3(h, g, x):
     """Solve h x = g for a symmetric positive (3, 3) by Cramer's rule."""
     c0 = h[1, 1] * h[2, 2] - h[1, 2] * h[2, 1]
     c1 = h[1, 2] * h[2, 0] - h[1, 0] * h[2, 2]
@@ -107,8 +116,8 @@ def _solve3(h, g, x):
     ) / d
 
 
-@njit(cache=True)
-def _turn(frame, ux, uy, uz, angle):
+@njit(**FAST)
+def turn_about(frame, ux, uy, uz, angle):
     """Turn the rows of a frame about a unit axis (Rodrigues)."""
     c, s = math.cos(angle), math.sin(angle)
     for k in range(3):
@@ -119,7 +128,7 @@ def _turn(frame, ux, uy, uz, angle):
         frame[k, 2] = z * c + (ux * y - uy * x) * s + uz * along
 
 
-@njit(cache=True)
+@njit(**FAST)
 def _tangents(d, t):
     """As `geometry.sphere.tangent_basis` has it, into t (2, 3)."""
     if abs(d[1]) > 0.9:
@@ -133,13 +142,25 @@ def _tangents(d, t):
     t[1, 2] = d[0] * t[0, 1] - d[1] * t[0, 0]
 
 
-@njit(cache=True)
+@njit(**FAST)
 def move_each(
-    lines, middles, halves, sigma, weight, directions, start, stiffness, tolerance, rounds, information
+    lines,
+    middles,
+    halves,
+    sigma,
+    weight,
+    directions,
+    start,
+    stiffness,
+    tolerance,
+    rounds,
+    information,
+    spread,
 ):
     """Gauss-Newton on each direction (K, 3) by itself, in place, held to `start` by a spring (rad^-2).
 
-    `information` (K, 2, 2) receives what the lines alone say, in the tangent planes.
+    `information` (K, 2, 2) receives what the lines alone say, in the tangent planes, `spread` (K, 2) their support
+    and the squared residuals summed with it.
     """
     n, count = len(lines), len(directions)
     nearest = np.empty(n, np.int64)
@@ -149,6 +170,7 @@ def move_each(
     for _ in range(rounds):
         assign(lines, middles, halves, sigma, directions, tolerance, nearest, support, residual, levers)
         information[:] = 0.0
+        spread[:] = 0.0
         g[:] = 0.0
         for k in range(count):
             _tangents(directions[k], t[k])
@@ -165,6 +187,8 @@ def move_each(
             information[k, 1, 1] += w * b * b
             g[k, 0] += w * a * residual[i]
             g[k, 1] += w * b * residual[i]
+            spread[k, 0] += w
+            spread[k, 1] += w * residual[i] * residual[i]
         largest = 0.0
         for k in range(count):
             information[k, 1, 0] = information[k, 0, 1]
@@ -173,7 +197,7 @@ def move_each(
             break
 
 
-@njit(cache=True)
+@njit(**FAST)
 def _step(d, start, t, information, g, stiffness):
     """One step of a direction along its tangents; returns its length, rad."""
     cosine = d[0] * start[0] + d[1] * start[1] + d[2] * start[2]
@@ -201,7 +225,7 @@ def _step(d, start, t, information, g, stiffness):
     return size
 
 
-@njit(cache=True)
+@njit(**FAST)
 def partner_votes(lines, middles, halves, sigma, weight, proposed, tolerance, bins, widest, angles, scores):
     """For each proposed direction (K, 3) the best angle of its orthogonal partners; see `orthogonal_frames`.
 
@@ -219,8 +243,10 @@ def partner_votes(lines, middles, halves, sigma, weight, proposed, tolerance, bi
         for i in range(len(lines)):
             l0, l1, l2 = lines[i, 0], lines[i, 1], lines[i, 2]
             lever = reach(lines, middles, halves, i, v[0], v[1], v[2])
-            r = (l0 * v[0] + l1 * v[1] + l2 * v[2]) / (lever * sigma[i] * tolerance)
-            own = max(0.0, 1.0 - r * r)
+            own = 0.0
+            if lever > 0.0:
+                r = (l0 * v[0] + l1 * v[1] + l2 * v[2]) / (lever * sigma[i] * tolerance)
+                own = max(0.0, 1.0 - r * r)
             own_score += weight[i] * own
             if own >= 0.9:
                 continue
@@ -231,8 +257,9 @@ def partner_votes(lines, middles, halves, sigma, weight, proposed, tolerance, bi
             x = cosine * t[0, 0] + sine * t[1, 0]
             y = cosine * t[0, 1] + sine * t[1, 1]
             z = cosine * t[0, 2] + sine * t[1, 2]
-            half = tolerance * sigma[i] * math.hypot(x - z * middles[i, 0], y - z * middles[i, 1]) / slope
-            if half >= widest * width:
+            lever = reach(lines, middles, halves, i, x, y, z)
+            half = tolerance * sigma[i] * lever / slope
+            if lever == 0.0 or half >= widest * width:
                 continue
             at = math.atan2(sine, cosine) / width
             half = max(half / width, 0.75)
@@ -249,7 +276,7 @@ def partner_votes(lines, middles, halves, sigma, weight, proposed, tolerance, bi
         scores[k] = own_score + histogram[best]
 
 
-@njit(cache=True)
+@njit(**FAST)
 def pair_votes(lines, weight, bands, parts, starts, total, mean):
     """All pairs of lines vote for the direction where they meet, into cells as `EqualAreaCells` has them.
 

@@ -30,7 +30,7 @@ class VanishingPoints:
     Attributes:
         directions: (M, 3) unit vectors in the optical frame (x right, y down, z forward), z >= 0.
         covariance: (M, 2, 2) rad^2, in the tangent plane of each direction (`geometry.sphere.tangent_basis`).
-        weight: (M,) support: lines that agree, each counted by the root of its length (the mean line counts 1).
+        weight: (M,) support: lines that agree, each by the root of length times contrast (the mean line counts 1).
         roles: (M,) uint32, a `Role` each.
         ids: (M,) uint32, stable from picture to picture once tracked, 0 before.
         labels: (N,) index of the vanishing point of each line given, -1 for clutter.

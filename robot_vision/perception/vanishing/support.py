@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 #: Residual at which a line stops supporting a vanishing point, in standard deviations.
 TOLERANCE = 2.0
+#: Lines that miss by more than the tolerance and less than this many times it tell how dense clutter is there.
+_BESIDE = 3.0
 
 
 def agreement(residuals: Array, tolerance: float = TOLERANCE) -> Array:
@@ -27,22 +29,31 @@ def assignment(residuals: Array, tolerance: float = TOLERANCE) -> tuple[NDArray[
     return np.where(support > 0.0, nearest, -1), support
 
 
-def false_alarms(bundle: Bundle, agrees: NDArray[np.bool_], spent: int, tests: float) -> float:
+def false_alarms(
+    bundle: Bundle, residuals: Array, free: NDArray[np.bool_], spent: int, tests: float
+) -> float:
     """How many directions with this many lines one expects in a picture of clutter alone.
 
     A line of random direction falls within the tolerance of a given direction with probability 2 T / pi, T =
     tolerance times sigma, so the number that do is binomial; the lines that fixed the direction agree anyway and do
-    not count (Desolneux, Moisan and Morel 2000: a contrario detection).
+    not count (Desolneux, Moisan and Morel 2000: a contrario detection). Clutter may prefer a direction, as blades of
+    grass do: then as many lines miss the tolerance by a little as keep it, and chance is what they tell, if more.
 
     Args:
         bundle: the lines that could have agreed.
-        agrees: (N,) which of them do.
+        residuals: (N,) of the lines to the direction.
+        free: (N,) which of them lead to no other direction.
         spent: number of lines that fix the direction.
         tests: number of directions among which this one was chosen.
     """
+    away = np.abs(residuals)
+    agrees = free & (away < TOLERANCE)
     trials, agreeing = len(bundle) - spent, int(agrees.sum()) - spent
     if trials < 1 or agreeing < 1:
         return tests
     chance = float(np.mean(np.minimum(2.0 * TOLERANCE * bundle.sigma / np.pi, 1.0)))
+    beside = int((free & ~agrees & (away < _BESIDE * TOLERANCE)).sum())
+    # As many as were counted, and as many more as a count is uncertain by.
+    chance = min(max(chance, (beside + np.sqrt(beside)) / (_BESIDE - 1.0) / trials), 1.0)
     # Probability of `agreeing` or more among `trials`.
     return tests * float(betainc(agreeing, trials - agreeing + 1, chance))
