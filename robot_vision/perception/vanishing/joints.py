@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
 from robot_vision.geometry.sphere import cross, normalised
+from robot_vision.perception.regular_marks import RegularMarks, find_regular
 from robot_vision.perception.segments import LineSegments
-from robot_vision.perception.spacings import RegularMarks, find_regular
 from robot_vision.perception.vanishing.points import VanishingPoints
 
 Array = NDArray[np.float64]

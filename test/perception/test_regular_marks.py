@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_vision.perception.spacings import find_regular
+from robot_vision.perception.regular_marks import find_regular
 
 
 @given(
