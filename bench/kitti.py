@@ -40,9 +40,9 @@ def run(quick: bool) -> list[Table]:
         seen = primary_azimuths(answers, made.pictures)
     score = score_azimuths(seen, travel_azimuths(poses))
     rows = [
-        Row("error, median", "deg", [Cell(score.median, at_most(0.3))], 3),
+        Row("error, median", "deg", [Cell(score.median, at_most(0.2))], 3),
         Row("error, worst", "deg", [Cell(score.worst, at_most(2.0))], 2),
-        Row("jitter from picture to picture", "deg", [Cell(score.jitter, at_most(0.3))], 3),
+        Row("jitter from picture to picture", "deg", [Cell(score.jitter, at_most(0.15))], 3),
         Row("jitter of the travel itself", "deg", [Cell(score.true_jitter)], 3),
         Row("pictures without an answer", "%", [Cell(score.missing, at_most(2.0))]),
     ]
