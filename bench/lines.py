@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.hough import HoughFinder
 from bench.report import Cell, Row, Table, at_most
 from bench.sources import CORRIDOR, MissingSetError, YorkPicture, york_urban
 from bench.york import Find, lsd
@@ -41,7 +40,7 @@ def run(quick: bool) -> list[Table]:
     trace.warm_up()
     ways: dict[str, Find] = {
         "trace": trace.detect,
-        "hough": HoughFinder().find,
+        "hough": LineDetector(method="hough").detect,
         "OpenCV LSD": lsd(),
     }
     spent = {name: np.zeros((ROUNDS, len(pictures))) for name in ways}

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import directions as scores
-from bench.hough import HoughFinder
 from bench.peer import LuVpDetect, MissingPeerError
 from bench.report import Cell, Mark, Row, Table, at_least, at_most
 from bench.sources import YorkPicture, york_urban
@@ -150,7 +149,7 @@ def run(quick: bool) -> list[Table]:
     ways = {
         "trace": ours(trace.detect, camera),
         "focal withheld": ours(trace.detect, blind),
-        "hough": ours(HoughFinder().find, camera),
+        "hough": ours(LineDetector(method="hough").detect, camera),
         "OpenCV LSD": ours(lsd(), camera),
     }
     notes = ["the three best-supported vanishing points count; a missing one is 90 deg off"]

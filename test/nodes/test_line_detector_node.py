@@ -142,6 +142,9 @@ def test_an_impossible_setting_is_refused_live_with_the_reason(bench: NodeBench)
     refused = bench.set_parameter("edge_contrast", 200.0)
     assert not refused.successful
     assert "must not exceed contrast" in refused.reason
+    refused = bench.set_parameter("method", "guess")
+    assert not refused.successful
+    assert "trace, hough" in refused.reason
     refused = bench.set_parameter("min_length", -1.0)
     assert not refused.successful
     assert_edge_found(show(bench, half_bright()))
