@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 from bench.floors import FLOORS, middle_cell
 from bench.report import Cell, Row, Table, at_least, at_most
 from bench.sources import ROOT
-from robot_vision.planning import distance_field
+from robot_vision.planning import cost_field, distance_field
 from robot_vision.planning.path import warm_up
 
 SIZES, QUICK_SIZES = (500, 1000, 2000, 4000), (250, 500)
 FASTER = {"maze": 3.0, "rooms": 8.0}
 NEAR_CELLS, NEAR_GOALS = 40, 15
+ERRORS_SIZE, FAR_CELLS = 500, 10
 PEER = "skfmm"
 Field = Callable[[NDArray[np.bool_], tuple[int, int]], Any]
 
@@ -45,7 +46,33 @@ def run(quick: bool) -> list[Table]:
     """Measure four sizes, two small ones when it is to be quick."""
     warm_up()
     sizes = QUICK_SIZES if quick else SIZES
-    return [_table(kind, sizes) for kind in FLOORS]
+    return [_errors(), *(_table(kind, sizes) for kind in FLOORS)]
+
+
+def _errors() -> Table:
+    """Fast marching against the exact field, where all cells cost the same."""
+    marching, peers = [], []
+    for floor in FLOORS.values():
+        free = floor(ERRORS_SIZE)
+        goal = middle_cell(free)
+        exact = distance_field(free, goal)
+        far = np.isfinite(exact) & (exact > FAR_CELLS)
+        found = [cost_field(np.where(free, 1.0, np.inf), goal)]
+        if find_spec(PEER) is not None:
+            # scikit-fmm's front lies half a cell around the goal's centre
+            found.append(np.asarray(spread_by_peer(free, goal).filled(np.inf)) + 0.5)
+        errors = [100.0 * np.abs(field[far] / exact[far] - 1.0) for field in found]
+        marching.append(errors[0])
+        peers.append(errors[1] if len(errors) > 1 else np.array([math.nan]))
+    rows = [
+        Row("cost_field, worst", "%", [Cell(float(e.max()), at_most(0.5)) for e in marching], 3),
+        Row("cost_field, mean", "%", [Cell(float(e.mean())) for e in marching], 5),
+        Row("scikit-fmm order 2, worst", "%", [Cell(float(e.max())) for e in peers], 3),
+        Row("scikit-fmm order 2, mean", "%", [Cell(float(e.mean())) for e in peers], 3),
+    ]
+    title = f"Fast marching over even floors of {ERRORS_SIZE}², more than {FAR_CELLS} cells from the goal"
+    notes = ["against distance_field, which is held to brute force (tests, and the benchmark paths)"]
+    return Table(title, list(FLOORS), rows, notes)
 
 
 def _table(kind: str, sizes: tuple[int, ...]) -> Table:
@@ -73,7 +100,6 @@ def _table(kind: str, sizes: tuple[int, ...]) -> Table:
     ]
     notes = [
         f"near: within {NEAR_CELLS} cells; memory: what a process of its own needs beyond the grid itself",
-        "errors: exact to rounding, as the tests hold against brute force; scikit-fmm's are up to some per cent",
     ]
     return Table(f"Distance functions of {kind}, goal in the middle", [f"{s}²" for s in sizes], rows, notes)
 
