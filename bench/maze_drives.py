@@ -11,9 +11,7 @@ from typing import Any
 from bench.report import Cell, Row, Table, at_least, at_most
 from bench.sources import data_set
 from robot_vision.control import PathPursuit
-from robot_vision.planning import Maze
-from robot_vision.planning.floor_map import FloorMap
-from robot_vision.planning.navigator import Navigator
+from robot_vision.planning import FloorMap, Maze, Navigator
 from robot_vision.simulation import floor_plan
 from robot_vision.simulation.live import LiveDrive, LiveSettings
 from robot_vision.simulation.maze import maze_world

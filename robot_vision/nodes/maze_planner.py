@@ -155,7 +155,8 @@ class MazePlannerNode(VisionNode):
         self._tell(route, message.header)
         if not len(route.points):
             self._stand_still()
-            self.diagnostics.report(Level.WARN, f"stands still: {route.reason}", route.advice)
+            level, state = (Level.OK, "") if route.done else (Level.WARN, "stands still: ")
+            self.diagnostics.report(level, f"{state}{route.reason}", route.advice)
             return
         if self._navigator.has_arrived(x, y):
             self._stand_still()

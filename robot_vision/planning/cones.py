@@ -35,7 +35,7 @@ import numpy as np
 from numba import njit
 
 TOLERANCE = 1e-7
-"""Cells; sums of a million steps of double precision stay below it."""
+"""Cells; ways that differ by less may take either course. Far above the rounding of sums up to some 100 000 cells."""
 FULL = -1
 """In place of a count: a buffer is too small. (Buffers that grow inside the loops would cost half of the time.)"""
 

@@ -81,17 +81,23 @@ def _steps_down(heights: NDArray[np.float64], cell: tuple[int, int]) -> list[tup
     """Cells from one to the next by the steepest slope, until none lies lower; heights padded by inf."""
     steps = [cell]
     while True:
-        row, column = cell
-        here, steepest, slope = heights[cell], cell, 0.0
-        for down, right in _AROUND:
-            if down and right:
-                beside = heights[row + down, column], heights[row, column + right]
-                if not np.isfinite(beside).all():
-                    continue
-            fall = (here - heights[row + down, column + right]) / np.hypot(down, right)
-            if fall > slope:
-                steepest, slope = (row + down, column + right), fall
-        if steepest == cell:
+        # touching the corner of a wall is the last resort, for a cell that lies right behind one
+        below = _steepest(heights, cell, 2) or _steepest(heights, cell, 1)
+        if below is None:
             return steps
-        cell = steepest
+        cell = below
         steps.append(cell)
+
+
+def _steepest(heights: NDArray[np.float64], cell: tuple[int, int], room: int) -> tuple[int, int] | None:
+    """The neighbour with the steepest slope down; diagonally with so many free cells beside the step."""
+    row, column = cell
+    best, slope = None, 0.0
+    for down, right in _AROUND:
+        beside = heights[row + down, column], heights[row, column + right]
+        if down and right and np.isfinite(beside).sum() < room:
+            continue
+        fall = (heights[cell] - heights[row + down, column + right]) / np.hypot(down, right)
+        if fall > slope:
+            best, slope = (row + down, column + right), fall
+    return best

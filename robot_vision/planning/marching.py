@@ -114,6 +114,23 @@ def _solved(travel, distance, roots, state, row, column, price, slope_y, slope_x
 
 
 @njit(cache=True)
+def _around_corner(travel, distance, state, row, column, price, corner_y, corner_x, away):
+    """T of a cell right behind the corner (not padded) its way turns at, by the cells before the corner; inf if none.
+
+    No neighbour on an axis tells of that way: T of the corner is its distance times the tau of a cell beside it.
+    """
+    found = np.inf
+    for down in range(2):
+        for right in range(2):
+            r, c = int(math.floor(corner_y)) + 1 + down, int(math.floor(corner_x)) + 1 + right
+            if state[r, c] == _ACCEPTED and distance[r, c] > 0.0 and (r != row or c != column):
+                before = (distance[row, column] - away) * travel[r, c] / distance[r, c]
+                if before + price * away > travel[r, c]:
+                    found = min(found, before + price * away)
+    return found
+
+
+@njit(cache=True)
 def march(cost, goal, until, distance, roots, corners, travel):
     """Spread the travel cost from a goal.
 
@@ -157,6 +174,11 @@ def march(cost, goal, until, distance, roots, corners, travel):
             # next to the goal the cost on the way is that of half of either cell
             here = cost[r, c] if value > 0.0 else 0.5 * (cost[r, c] + cost[row, column])
             fresh = _solved(travel, distance, roots, state, r, c, here, away_y / away, away_x / away)
+            if root > 0 and away < 1.0:
+                turned = _around_corner(
+                    travel, distance, state, r, c, here, corners[root, 0], corners[root, 1], away
+                )
+                fresh = min(fresh, turned)
             # what a second axis adds may raise it; the lower key then no longer counts
             if fresh != travel[r, c]:
                 travel[r, c] = fresh

@@ -30,6 +30,7 @@ class Route:
         reason: in plain words why there is no way, or what there is to say about it; empty if all is well.
         advice: what to try; may be empty.
         number: of the plan: another one means another way.
+        done: there is no way because all is explored.
     """
 
     points: NDArray[np.float64]
@@ -37,11 +38,16 @@ class Route:
     reason: str = ""
     advice: str = ""
     number: int = 0
+    done: bool = False
 
 
 _NOWHERE = np.zeros((0, 2))
 _LEAST = {"radius": 0.0, "middle": 0.0, "frontier": 0.0, "astray": 1e-3, "arrival": 1e-3}
 """Metres."""
+
+
+class _ExploredError(PlanningError):
+    """There is nothing left to explore."""
 
 
 @dataclass
@@ -138,7 +144,8 @@ class Navigator:
             except PlanningError as why:
                 same = not len(before.points) and before.reason == str(why)
                 number = before.number + (not same)
-                self._route = Route(_NOWHERE, 0.0, str(why), _advice(why), number)
+                done = isinstance(why, _ExploredError)
+                self._route = Route(_NOWHERE, 0.0, str(why), _advice(why), number, done)
         return self._route
 
     def has_arrived(self, x: float, y: float) -> bool:
@@ -199,7 +206,7 @@ class Navigator:
         if self._target is None or not edge[self._target]:
             self._target = nearest_frontier(roomy, edge, robot)
         if self._target is None:
-            raise PlanningError("explored: nothing unseen can be reached any more")
+            raise _ExploredError("explored: nothing unseen can be reached any more")
         way = self._plan(floor, ~floor.occupied & ~floor.unknown, robot, self._target)
         return floor.to_world(way), np.inf, ""
 

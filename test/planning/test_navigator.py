@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robot_vision.planning import Maze, PlanningError, maze_to_grid
-from robot_vision.planning.floor_map import FloorMap
-from robot_vision.planning.navigator import Navigator
+from robot_vision.planning import FloorMap, Maze, Navigator, PlanningError, maze_to_grid
 from robot_vision.simulation.maze import grown
 
 DATA = Path(os.environ.get("ROBOT_VISION_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
