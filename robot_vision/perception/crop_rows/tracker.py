@@ -152,9 +152,8 @@ class RowTracker:
             if self.row_filter.knows:
                 self._look_along(pieces, camera, self._start(), motion)
             return self._without(fault)
-        known = self.row_filter.knows
-        if known:
-            rows = nearest_row(rows, float(self.row_filter.expected()[OFFSET]))
+        expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
+        rows = nearest_row(rows, expected)
         if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3]):
             self._look_along(pieces, camera, self._start(), motion)
             return self._without("what stands in this picture does not go on from the rows before")
