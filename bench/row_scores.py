@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 MIDDLE_ROWS = np.array([-1.0, 0.0, 1.0])
 
 
-def crda(table: Array, truth: Array, width: int, sigma: float) -> float:
+def crda(table: Array, truth: Array, middle: float, sigma: float) -> float:
     """Mean over image rows and the three central crop rows of max(0, 1 - ((u* - u) / (sigma d))^2).
 
     The found rows are shifted by that whole number of rows which fits best.
@@ -19,12 +19,12 @@ def crda(table: Array, truth: Array, width: int, sigma: float) -> float:
     Args:
         table: (H, K) columns of the rows found at each image row, left to right, px.
         truth: (N, 2) as in `CropPicture.rows`.
-        width: of the picture, px.
+        middle: column from which the truth counts, px.
         sigma: of the spacing d that is an error too many.
     """
     found = table[len(table) - len(truth) :]
     spacing = truth[:, 1:]
-    true = 0.5 * width + truth[:, :1] + MIDDLE_ROWS * spacing
+    true = middle + truth[:, :1] + MIDDLE_ROWS * spacing
     return max(
         float(np.maximum(0.0, 1.0 - ((found[:, k : k + 3] - true) / (sigma * spacing)) ** 2).mean())
         for k in range(found.shape[1] - 2)

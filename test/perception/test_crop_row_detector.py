@@ -135,9 +135,9 @@ def test_settings_without_meaning_are_refused() -> None:
 def test_the_score_knows_a_perfect_answer_and_a_useless_one() -> None:
     truth = np.column_stack([np.linspace(-3, 3, 100), np.linspace(20, 60, 100)])
     table = 160.0 + truth[:, :1] + np.arange(-4, 5) * truth[:, 1:]
-    assert crda(table, truth, 320, 0.1) == pytest.approx(1.0)
-    assert crda(table + 0.5 * truth[:, 1:], truth, 320, 0.1) == 0.0
-    assert crda(table + 0.05 * truth[:, 1:], truth, 320, 0.1) == pytest.approx(0.75)
+    assert crda(table, truth, 160.0, 0.1) == pytest.approx(1.0)
+    assert crda(table + 0.5 * truth[:, 1:], truth, 160.0, 0.1) == 0.0
+    assert crda(table + 0.05 * truth[:, 1:], truth, 160.0, 0.1) == pytest.approx(0.75)
 
 
 def test_real_fields_are_read_far_better_than_by_the_recipe() -> None:

@@ -48,11 +48,17 @@ def test_rows_are_followed_and_offset_and_yaw_are_right() -> None:
     assert lane.curvature == pytest.approx(0.0, abs=0.003)
 
 
+def test_the_row_followed_is_the_one_nearest_to_the_robot() -> None:
+    (first,) = along(RowTracker(0.5), Sown(offset=0.45, missing=0.0), 1)
+    assert first.lane is not None
+    assert first.lane.offset == pytest.approx(-0.05, abs=0.02)
+
+
 def test_the_end_of_the_rows_is_told_and_a_gap_is_driven_through() -> None:
     ends = [estimate.end for estimate in along(RowTracker(0.5), Sown(end=4.5), 4)]
     assert ends[-1] == pytest.approx(4.5 - 0.45, abs=0.5)
     tracker = RowTracker(0.5)
-    through = along(tracker, Sown(gap=(1.5, 4.5)), 24)
+    through = along(tracker, Sown(gap=(2.5, 5.5)), 26)
     assert all(estimate.end is None for estimate in through)
     assert all(estimate.lane is not None for estimate in through)
     assert abs(through[-1].lane.offset) < 0.03  # type: ignore[union-attr]

@@ -78,6 +78,16 @@ class RowExtent:
         np.add.at(self._cover, place[good], seen[good] * cover[good])
         np.add.at(self._seen, place[good], seen[good])
 
+    def is_open(self, way: float, ahead: Array) -> NDArray[np.bool_]:
+        """Whether places so far ahead of the robot (N,), m, are known to be open ground: what grows there is weed."""
+        known = self._seen > _KNOWN
+        if not known.any():
+            return np.zeros(len(ahead), np.bool_)
+        cover = self._mean_cover(known)
+        bare = known & (cover < self.sparse * self._usual(cover, known, way))
+        place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
+        return np.asarray(bare[np.clip(place, 0, _CELLS - 1)])
+
     def end(self, way: float) -> float | None:
         """Metres from the robot to where the rows end, negative behind it; None: no end is known.
 
@@ -106,6 +116,11 @@ class RowExtent:
         first = int(begins[is_open.argmax()])
         last = int(stands[stands < first + _TAIL].max())
         return float((self._origin + last + 1) * CELL_M - way)
+
+    def _mean_cover(self, known: NDArray[np.bool_]) -> Array:
+        """Cover of each stretch: neighbours together, as single plants are missing everywhere."""
+        cover = np.where(known, self._cover / np.maximum(self._seen, 1e-9), 0.0)
+        return np.asarray(np.convolve(cover, _WEIGHTS, "same"))
 
     def _usual(self, cover: Array, known: NDArray[np.bool_], way: float) -> float:
         """Cover of a stretch on which plants stand, by those near the robot where there are enough."""

@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 USUAL_HEIGHT = 240.0
 _PHASES = 64
+#: Phases to either side of the best path that are averaged.
+_NEAR_PHASES = 20
 #: Share of the picture's width as spacing up to which a step sideways is cheaper the fewer pixels it is.
 _WIDE = 0.35
 
@@ -53,23 +55,25 @@ class RowTracer:
         stretch_cost: of a change of the spacing by a step.
         stretched_cost: of a spacing that differs by its own size, an image row of a picture 240 high.
         smooth: standard deviation of the smoothing along the path, bands.
+        doubt: by how much less a path may score whose say is still a third of the best one's.
     """
 
     band: float = 3.0
-    reach: float = 2.7
+    reach: float = 2.6
     power: float = 0.4
-    blur: float = 0.057
+    blur: float = 0.052
     stretch: float = 0.11
     stretches: int = 7
     drift: int = 7
     turn_cost: float = 4.0
     drift_cost: float = 0.01
     stretch_cost: float = 1.28
-    stretched_cost: float = 0.8
+    stretched_cost: float = 0.6
     smooth: float = 3.0
+    doubt: float = 2.0
 
     def __post_init__(self) -> None:
-        self._totals = np.empty((0, 0, 0, 0), np.float32)
+        self._totals = self._back = np.empty((0, 0, 0, 0), np.float32)
 
     def trace(self, weight: NDArray[np.float32], rows: StraightRows, least: float) -> TracedRows:
         """Follow rows through a weight picture (H, W).
@@ -79,7 +83,7 @@ class RowTracer:
             rows: from which it begins.
             least: spacing below which an image row says nothing, px.
         """
-        from robot_vision.perception.crop_rows.tracing_kernels import accumulate, recall, score_bands
+        from robot_vision.perception.crop_rows.tracing_kernels import score_bands
 
         height, width = weight.shape
         spacing, phase, first = expected(rows, height, least)
@@ -101,18 +105,42 @@ class RowTracer:
         turn = (self.turn_cost * np.minimum(wide, 1.0) ** 2).astype(np.float32)
         shape = (bands, self.stretches, 2 * self.drift + 1, _PHASES)
         if self._totals.shape != shape:
-            self._totals = np.empty(shape, np.float32)
-        accumulate(scores, turn, self.drift_cost * turn, np.float32(self.stretch_cost), self._totals)
-        path = np.empty((bands, 2), np.int64)
-        total = recall(self._totals, turn, np.float32(self.stretch_cost), path)
-        lag = path[:, 1] - _PHASES // 2
-        lag = (lag - _PHASES * np.round(lag[-1] / _PHASES)) / _PHASES
+            self._totals, self._back = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        lag, stretch = self._path(scores, turn, stretches)
         lines = np.arange(height)
         moved = np.interp(lines, middles, _smoothed(lag, self.smooth))
-        stretched = spacing * (1.0 + np.interp(lines, middles, _smoothed(stretches[path[:, 0]], self.smooth)))
-        return TracedRows(
-            centre + moved * spacing + nearest * stretched, stretched, float(total) / USUAL_HEIGHT
-        )
+        stretched = spacing * (1.0 + np.interp(lines, middles, _smoothed(stretch, self.smooth)))
+        total = float(self._totals[-1].max()) / USUAL_HEIGHT
+        return TracedRows(centre + moved * spacing + nearest * stretched, stretched, total)
+
+    def _path(
+        self, scores: NDArray[np.float32], turn: NDArray[np.float32], stretches: Array
+    ) -> tuple[Array, Array]:
+        """Phase about the one expected, in spacings, and stretch of each band, (B,) each.
+
+        The best path tells which way; about it, every state is weighed by the best path that leads through it, so
+        that where several fit about as well their mean is taken.
+        """
+        from robot_vision.perception.crop_rows.tracing_kernels import accumulate, recall
+
+        cost = np.float32(self.stretch_cost)
+        accumulate(scores, turn, self.drift_cost * turn, cost, self._totals)
+        path = np.empty((len(scores), 2), np.int64)
+        recall(self._totals, turn, cost, path)
+        # Upwards a path drifts the other way
+        backwards = np.ascontiguousarray(turn[::-1])
+        upwards = np.ascontiguousarray(scores[::-1])
+        accumulate(upwards, backwards, self.drift_cost * backwards, cost, self._back)
+        through = self._totals + self._back[::-1, :, ::-1, :]
+        through -= scores[:, :, None, :]
+        best = path[:, 1:]
+        aside = (np.arange(_PHASES) - best + _PHASES // 2) % _PHASES - _PHASES // 2
+        by_phase, by_stretch = through.max(axis=(1, 2)), through.max(axis=(2, 3))
+        phases = _weights(by_phase, self.doubt) * (np.abs(aside) <= _NEAR_PHASES)
+        lag = best[:, 0] - _PHASES // 2
+        lag = lag - _PHASES * np.round(lag[-1] / _PHASES) + (phases * aside).sum(axis=1) / phases.sum(axis=1)
+        weights = _weights(by_stretch, self.doubt)
+        return lag / _PHASES, np.asarray(weights @ stretches / weights.sum(axis=1))
 
     def _kernel(self) -> NDArray[np.float32]:
         reach = int(3.0 * self.blur * _PHASES + 1.0)
@@ -141,6 +169,11 @@ def expected(rows: StraightRows, height: int, least: float) -> tuple[Array, Arra
     density = 1.0 / spacing - 1.0 / spacing[-1]
     x = density / (density[first] + 1e-9)
     return spacing, rows.offset + rows.column * density + rows.bend * (x * x - x), first
+
+
+def _weights(scores: NDArray[np.float32], doubt: float) -> Array:
+    """Say (B, N) of each state beside the best one of its band."""
+    return np.asarray(np.exp((scores - scores.max(axis=1, keepdims=True)) / doubt), np.float64)
 
 
 def _smoothed(values: Array, sigma: float) -> Array:

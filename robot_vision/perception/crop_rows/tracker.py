@@ -146,15 +146,14 @@ class RowTracker:
             else between_plants(pieces_of(~mask, camera, cell, 0.5), pieces, camera)
         )
         if self.row_filter.knows:
-            told = self._before_the_end(told, camera)
+            told = self._where_rows_stand(told, camera)
         rows, fault = self._fitted(picture, told, covered, camera)
         if rows is None:
             if self.row_filter.knows:
                 self._look_along(pieces, camera, self._start(), motion)
             return self._without(fault)
-        known = self.row_filter.knows
-        if known:
-            rows = nearest_row(rows, float(self.row_filter.expected()[OFFSET]))
+        expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
+        rows = nearest_row(rows, expected)
         if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3]):
             self._look_along(pieces, camera, self._start(), motion)
             return self._without("what stands in this picture does not go on from the rows before")
@@ -167,13 +166,13 @@ class RowTracker:
         """What a picture should show, (6,): as predicted, the body upright."""
         return np.array([*self.row_filter.expected(), 0.0, 0.0, -0.02])
 
-    def _before_the_end(self, pieces: Pieces, camera: Camera) -> Pieces:
-        """Leave out what grows where the rows are known to be over: weeds, and the grass of the headland."""
-        end = self.extent.end(self._way)
-        if end is None:
-            return pieces
+    def _where_rows_stand(self, pieces: Pieces, camera: Camera) -> Pieces:
+        """Leave out what grows in known gaps and where the rows are over: weeds, and the grass of the headland."""
         x, _ = ground_places(pieces.rays, camera, self._start())
-        here = x < end + CELL_M
+        here = ~self.extent.is_open(self._way, x)
+        end = self.extent.end(self._way)
+        if end is not None:
+            here &= x < end + CELL_M
         return Pieces(pieces.rays[here], pieces.weight[here], pieces.aside)
 
     def _covered(self, pieces: Pieces, camera: Camera) -> float:
