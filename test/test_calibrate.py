@@ -167,6 +167,7 @@ def test_a_road_looked_down_squarely_does_not(tmp_path: Path) -> None:
     calibration = str(source.parent / "calib.txt")
     make_bag(source, tmp_path / "road.mcap", calibration=calibration)
     found = found_in(tmp_path / "road.mcap")
-    assert not found.focal.known and "says nothing of the focal length" in found.focal.reason
+    # Too few pictures tell of it, or those that seem to disagree: either way it is not told, and why is.
+    assert not found.focal.known and "right angles" in found.focal.reason
     assert found.camera.fx == pytest.approx(707.0912)
     assert found.pitch.value == pytest.approx(math.radians(0.9), abs=math.radians(0.4))
