@@ -21,6 +21,7 @@ BENCHMARKS = {
     "kitti": "the way ahead on a real road, through the real nodes",
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
+    "attitude": "roll and pitch of a body that leans by up to 3 degrees",
     "road": "heading and curvature on a winding road, 500 m of bends driven ten times",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "latency": "from picture to steering at 30 Hz, processes over DDS",

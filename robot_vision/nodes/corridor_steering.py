@@ -10,6 +10,7 @@ robot shall stand still, with the stamp of the last picture, so that a replay gi
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -19,17 +20,18 @@ from numpy.typing import NDArray
 from rclpy.clock import Clock
 from rclpy.parameter import Parameter
 from rclpy.timer import Timer
-from sensor_msgs.msg import Range
+from sensor_msgs.msg import Imu, Range
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from robot_vision.control import CorridorSteering
 from robot_vision.perception import LaneHeading
+from robot_vision.perception.attitude import Lean, lean_from
 from robot_vision.ros import messages, qos
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.join import ExactJoin
 from robot_vision.ros.node import VisionNode, stamp_ns
-from robot_vision.ros.parameters import Setting
+from robot_vision.ros.parameters import CAMERA_PLACE, Setting
 from robot_vision.ros.run import run_node
 
 LIBRARY_SETTINGS = (
@@ -44,14 +46,20 @@ LIBRARY_SETTINGS = (
     Setting("stop_distance", 0.5, "what is left before an obstacle, m", 0.01, 50.0),
     Setting("yaw_trusted", 0.175, "standard deviation of the yaw beyond which to stop, rad", 0.001, 3.2),
     Setting("offset_trusted", 0.3, "standard deviation beyond which the offset is not used, m", 0.001, 50.0),
+    Setting("lean_slow", 0.14, "lean of the body from which on to slow, rad", 0.01, 3.0),
+    Setting("lean_stop", 0.35, "lean at which to stand still, rad", 0.02, 3.2),
 )
+#: How the camera looks when the robot stands upright: what `attitude` says beyond it is the robot's lean.
+UPRIGHT = tuple(setting for setting in CAMERA_PLACE if setting.name in ("camera.pitch", "camera.roll"))
 
 
 class CorridorSteeringNode(VisionNode):
-    """`heading`, `path_ahead` and `clearance` to `steering`."""
+    """`heading`, `path_ahead`, `attitude` and `clearance` to `steering`."""
 
     SETTINGS = (
         *LIBRARY_SETTINGS,
+        *UPRIGHT,
+        Setting("mind_lean", False, "slow when the body leans; camera.pitch and camera.roll must be right"),
         Setting("enabled", True, "whether to steer; the service enable sets it"),
         Setting("timeout", 0.5, "stand still after so long without a heading, s", 0.05, 60.0),
         Setting("max_age", 0.0, "oldest picture to steer by, s; 0: any, as for replays", 0.0, 60.0),
@@ -66,9 +74,12 @@ class CorridorSteeringNode(VisionNode):
         self._drives = False
         self._max_age_s = 0.0
         self._clearance: tuple[int, float] | None = None
+        self._upright = (0.0, 0.0)
+        self._leans: deque[tuple[int, Lean]] = deque(maxlen=2)
         self._on_bends: ExactJoin[Any] = ExactJoin(("heading", "path_ahead"), self._drive)
         self._steering = self.say(TwistStamped, "steering", qos.ANSWER)
         self._clearances = self.hear(Range, "clearance", self._hear_clearance, qos.NEWEST)
+        self._attitudes = self.hear(Imu, "attitude", self._hear_attitude, qos.NEWEST)
         self.hear(Path, "path_ahead", self._hear_path, qos.NEWEST)
         self.hear(
             PoseWithCovarianceStamped,
@@ -95,6 +106,7 @@ class CorridorSteeringNode(VisionNode):
         CorridorSteering(**own)  # refuses what makes no sense
         for name, value in own.items():
             setattr(self._corridor, name, value)
+        self._upright = values["camera.roll"], values["camera.pitch"]
         self._timeout_s = values["timeout"]
         self._max_age_s = values["max_age"]
         self._watch.timer_period_ns = round(1e9 * self._timeout_s)
@@ -110,6 +122,7 @@ class CorridorSteeringNode(VisionNode):
         self._corridor.reset()
         self._on_bends.reset()
         self._clearance = None
+        self._leans.clear()
 
     def _watch_clock(self) -> Clock:
         """Give the time by which silence is measured: that of the replay, if there is one."""
@@ -118,11 +131,24 @@ class CorridorSteeringNode(VisionNode):
     def _hear_clearance(self, message: Range) -> None:
         self._clearance = (stamp_ns(message.header.stamp), messages.clearance_from_message(message))
 
+    def _hear_attitude(self, message: Imu) -> None:
+        lean = lean_from(*messages.attitude_from_message(message), *self._upright)
+        self._leans.append((stamp_ns(message.header.stamp), lean))
+
+    def _lean_before(self, now_ns: int) -> Lean | None:
+        """Lean in the picture before the one steered by: that of this one may come before or after its heading."""
+        if not self.settings["mind_lean"]:
+            return None
+        oldest = now_ns - round(1e9 * self._timeout_s)
+        earlier = [lean for stamp, lean in self._leans if oldest <= stamp < now_ns]
+        return earlier[-1] if earlier else None
+
     def _hear_heading(self, message: PoseWithCovarianceStamped) -> None:
         began = time.perf_counter()
         lane = messages.heading_from_message(message)
         self.follow_time("heading", message.header.stamp)
         self.catch_up(self._clearances)
+        self.catch_up(self._attitudes)
         self._header = message.header
         if not self._enabled:
             return
@@ -148,7 +174,8 @@ class CorridorSteeringNode(VisionNode):
             self.diagnostics.report(Level.WARN, f"stands still: {refusal}")
             return
         clearance = self._clearance and self._clearance[1]
-        steering = self._corridor.update(lane, 1e-9 * now_ns, clearance, path)
+        lean = self._lean_before(now_ns)
+        steering = self._corridor.update(lane, 1e-9 * now_ns, clearance, path, lean)
         self._say(steering.speed, steering.turn_rate)
         self.answered(header.stamp, began)
         if steering.reason:

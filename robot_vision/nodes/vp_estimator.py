@@ -7,6 +7,7 @@ when there is something to say.
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -15,6 +16,7 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import CameraInfo, Imu, PointCloud2
 from std_msgs.msg import Header
 
+from robot_vision.perception.attitude import Lean, lean_from
 from robot_vision.perception.odometry import RateHistory
 from robot_vision.perception.way import Kind, WayEstimate, WayEstimator
 from robot_vision.ros import calibration, messages, qos
@@ -122,11 +124,22 @@ class VpEstimatorNode(VisionNode):
         self._say_vanishing_points(header, estimate)
         if estimate.attitude is not None and estimate.attitude.seen:
             self._attitude.publish(messages.attitude_to_message(header, estimate.attitude))
+        lean = self._lean(estimate)
         if lane is None:
             self.diagnostics.report(Level.WARN, estimate.reason, NO_WAY_ADVICE)
+        elif lean is not None and lean.angle >= self.settings["lean_warning"]:
+            tipping = f"may tip over: leans {math.degrees(lean.angle):.0f} degrees ({lean.towards})"
+            self.diagnostics.report(Level.WARN, tipping, "slow down, or look whether camera.pitch is right")
         else:
             known = f"knows heading and offset in a {estimate.frame}"
             self.diagnostics.report(Level.OK, estimate.reason or known)
+
+    def _lean(self, estimate: WayEstimate) -> Lean | None:
+        """Lean of the robot, where the picture tells of it."""
+        attitude, camera = estimate.attitude, self._calibration.camera
+        if attitude is None or not attitude.seen or camera is None:
+            return None
+        return lean_from(attitude.roll, attitude.pitch, camera.roll, camera.pitch)
 
     def _say_vanishing_points(self, header: Header, estimate: WayEstimate | None) -> None:
         found = None if estimate is None else estimate.vanishing_points

@@ -43,6 +43,29 @@ class Attitude:
         return cls(roll, pitch, covariance, up, jacobian @ covariance @ jacobian.T, True)
 
 
+@dataclass(frozen=True)
+class Lean:
+    """How far a body leans from how it stands upright.
+
+    Attributes:
+        angle: rad.
+        towards: the side it leans to most: left, right, forward or back.
+    """
+
+    angle: float
+    towards: str
+
+
+def lean_from(roll: float, pitch: float, mounted_roll: float, mounted_pitch: float) -> Lean:
+    """Lean of a body whose camera has this roll and pitch, and the mounted ones when the body is upright, rad."""
+    cosine = float(up_from_attitude(roll, pitch) @ up_from_attitude(mounted_roll, mounted_pitch))
+    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    sideways, forwards = roll - mounted_roll, pitch - mounted_pitch
+    if abs(sideways) >= abs(forwards):
+        return Lean(angle, "right" if sideways > 0.0 else "left")
+    return Lean(angle, "forward" if forwards > 0.0 else "back")
+
+
 def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     """The vertical that agrees best with the vertical vanishing point, the horizontal ones and the mounting.
 
@@ -54,7 +77,7 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
         lean: standard deviation of the body's lean about the mounting, rad.
     """
     mounted = points.camera.optical_to_base[2]
-    vertical = points.of(Role.VERTICAL)
+    vertical = _vertical(points)
     level = np.isin(points.roles, [Role.PRIMARY, Role.HORIZONTAL])
     directions, covariance = points.directions[level], points.covariance[level]
     tangents = tangent_basis(directions)
@@ -83,6 +106,12 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     seen = bool(np.any(telling & (points.weight > 0.0)))
     covariance = np.asarray(inverse @ up_covariance @ inverse.T, dtype=np.float64)
     return Attitude(roll, pitch, covariance, up, up_covariance, seen)
+
+
+def _vertical(points: VanishingPoints) -> int | None:
+    """The vertical vanishing point of this picture: after a jolt a track that is unseen may live on beside a new one."""
+    upright = np.flatnonzero(points.roles == Role.VERTICAL)
+    return int(upright[np.argmax(points.weight[upright])]) if len(upright) else None
 
 
 def _tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
