@@ -15,6 +15,10 @@ from robot_vision.perception.vanishing import Role, VanishingPoints
 Array = NDArray[np.float64]
 
 
+#: Support of a vertical vanishing point that is believed though no track of it is.
+_CLEAR = 15.0
+
+
 @dataclass(frozen=True)
 class Attitude:
     """Lean of the camera body.
@@ -66,7 +70,9 @@ def lean_from(roll: float, pitch: float, mounted_roll: float, mounted_pitch: flo
     return Lean(angle, "forward" if forwards > 0.0 else "back")
 
 
-def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
+def estimate_attitude(
+    points: VanishingPoints, lean: float, picture: VanishingPoints | None = None
+) -> Attitude:
     """The vertical that agrees best with the vertical vanishing point, the horizontal ones and the mounting.
 
     A vertical vanishing point names the vertical itself; each horizontal one says that the vertical lies at right
@@ -75,9 +81,11 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     Args:
         points: with roles; `points.camera` tells how the camera is mounted.
         lean: standard deviation of the body's lean about the mounting, rad.
+        picture: those of this picture alone. A body may roll faster than a track of the vertical follows; then the
+            vertical of the picture itself tells, if it has much support.
     """
     mounted = points.camera.optical_to_base[2]
-    vertical = _vertical(points)
+    vertical = _vertical(points, picture)
     level = np.isin(points.roles, [Role.PRIMARY, Role.HORIZONTAL])
     directions, covariance = points.directions[level], points.covariance[level]
     tangents = tangent_basis(directions)
@@ -93,10 +101,11 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
         pull = prior @ local_coordinates(up, mounted) - weighted.T @ (directions @ up)
         if vertical is not None:
             # The covariance holds in the tangent plane of the point; carry it over to that of `up`.
-            carried = basis @ tangent_basis(points.directions[vertical]).T
-            own = np.linalg.inv(carried @ points.covariance[vertical] @ carried.T)
+            direction, doubt = vertical
+            carried = basis @ tangent_basis(direction).T
+            own = np.linalg.inv(carried @ doubt @ carried.T)
             information = information + own
-            pull = pull + own @ local_coordinates(up, points.directions[vertical])
+            pull = pull + own @ local_coordinates(up, direction)
         up = retract(up, np.asarray(np.linalg.solve(information, pull), dtype=np.float64))
     up_covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     roll, pitch = attitude_from_up(up)
@@ -108,10 +117,16 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     return Attitude(roll, pitch, covariance, up, up_covariance, seen)
 
 
-def _vertical(points: VanishingPoints) -> int | None:
-    """The vertical vanishing point of this picture: after a jolt a track that is unseen may live on beside a new one."""
-    upright = np.flatnonzero(points.roles == Role.VERTICAL)
-    return int(upright[np.argmax(points.weight[upright])]) if len(upright) else None
+def _vertical(points: VanishingPoints, picture: VanishingPoints | None) -> tuple[Array, Array] | None:
+    """The vertical direction and its covariance: after a jolt an unseen track may live on beside what is seen."""
+    for told, least in ((points, 0.0), (picture, _CLEAR), (points, -1.0)):
+        if told is None:
+            continue
+        upright = np.flatnonzero((told.roles == Role.VERTICAL) & (told.weight > least))
+        if len(upright):
+            best = int(upright[np.argmax(told.weight[upright])])
+            return told.directions[best], told.covariance[best]
+    return None
 
 
 def _tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
