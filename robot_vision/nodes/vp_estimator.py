@@ -37,8 +37,9 @@ class VpEstimatorNode(VisionNode):
         Setting("lean", 0.035, "usual roll and pitch of the body about its mounting, rad", 0.001, 1.0),
         Setting("lane.narrowest", 0.5, "least width a lane may have, m", 0.05, 100.0),
         Setting("lane.widest", 12.0, "greatest width a lane may have, m", 0.05, 100.0),
+        Setting("lean_warning", 0.2, "lean of the body at which to warn of tipping over, rad", 0.01, 3.2),
         Setting(
-            "way", "auto", "what kind of way; auto: a corridor where walls are seen", choices=tuple(Kind)
+            "way", "auto", "auto: a corridor where walls are seen", choices=tuple(kind.value for kind in Kind)
         ),
         Setting("path_length", 10.0, "length of path_ahead, m; on a road at most 36", 1.0, 100.0),
     )
