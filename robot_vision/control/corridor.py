@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from robot_vision.control.limits import Steering, approach, speed_to_stop_within
 from robot_vision.perception import LaneHeading
+from robot_vision.perception.attitude import Lean
 
 Array = NDArray[np.float64]
 
+_TOWARDS = {"left": "to the left", "right": "to the right", "forward": "forward", "back": "back"}
 _FIRST_STEP = 0.05
 _LONGEST_STEP = 0.25
 
@@ -37,9 +39,12 @@ class CorridorSteering:
         stop_distance: what is left between robot and obstacle when it has stopped, m.
         yaw_trusted: standard deviation of the yaw beyond which the robot stops, rad.
         offset_trusted: standard deviation of the offset beyond which it is not used, m.
+        lean_slow: lean of the body from which on it slows, rad.
+        lean_stop: lean at which it stands still, so as not to tip over, rad.
 
     Raises:
-        ValueError: naming the setting that is not a positive number, or a `keep` that is none.
+        ValueError: naming the setting that is not a positive number, a `keep` that is none, or a `lean_slow` that is
+            not less than `lean_stop`.
     """
 
     speed: float = 0.5
@@ -53,6 +58,8 @@ class CorridorSteering:
     stop_distance: float = 0.5
     yaw_trusted: float = float(np.deg2rad(10.0))
     offset_trusted: float = 0.3
+    lean_slow: float = float(np.deg2rad(8.0))
+    lean_stop: float = float(np.deg2rad(20.0))
     _last: Steering = field(default_factory=lambda: Steering(0.0, 0.0), init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
 
@@ -63,6 +70,10 @@ class CorridorSteering:
                     raise ValueError(f"keep must be a number, not {value}")
             elif not name.startswith("_") and not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} must be a positive number, not {value}")
+        if self.lean_slow >= self.lean_stop:
+            raise ValueError(
+                f"lean_slow must be less than lean_stop, {self.lean_stop} rad, not {self.lean_slow}"
+            )
 
     def reset(self) -> None:
         """Stand still, as after a stop from outside or a clock that jumped."""
@@ -75,6 +86,7 @@ class CorridorSteering:
         stamp_s: float,
         clearance_m: float | None = None,
         path: Array | None = None,
+        lean: Lean | None = None,
     ) -> Steering:
         """The command for one picture.
 
@@ -85,6 +97,7 @@ class CorridorSteering:
             lane: where the robot stands and heads in its lane; None stops at once.
             stamp_s: time of the picture, s.
             clearance_m: free floor ahead, m; None when nobody looks.
+            lean: of the body; None when unknown.
             path: (N, 2) the centre line ahead in base_link, m; None where it is straight, or has fewer than 2 points.
         """
         if lane is None:
@@ -106,10 +119,16 @@ class CorridorSteering:
             distance = float(np.hypot(reach, aside))
             bearing = -lane.yaw + float(np.arctan2(aside, reach))
             wanted = self._cruising_speed(bearing, lane)
+        steady = 1.0 if lean is None else self._share_when_leaning(lean)
+        wanted *= steady
         allowed = self._allowed_speed(clearance_m)
         obstructed = allowed < wanted
         wanted = min(wanted, allowed)
         reason = _obstruction(clearance_m) if obstructed and clearance_m is not None else ""
+        if lean is not None and steady < 1.0 and not reason:
+            reason = (
+                f"leans {np.degrees(lean.angle):.0f} degrees {_TOWARDS[lean.towards]}: slows not to tip over"
+            )
         seconds = self._seconds_since(stamp_s)
         # Braking for an obstacle is not softened: the wanted speed then follows the braking curve already.
         speed = wanted if obstructed else approach(self._last.speed, wanted, self.most_acceleration * seconds)
@@ -149,6 +168,12 @@ class CorridorSteering:
         # half when the yaw is only just trusted.
         speed = self.speed * float(np.cos(1.25 * min(abs(bearing), 1.0)))
         return speed * (1.0 - 0.5 * float(np.sqrt(lane.yaw_variance)) / self.yaw_trusted)
+
+    def _share_when_leaning(self, lean: Lean) -> float:
+        """Share of the speed that is left; a lean that is no number leaves none."""
+        if np.isnan(lean.angle):
+            return 0.0
+        return float(np.clip((self.lean_stop - lean.angle) / (self.lean_stop - self.lean_slow), 0.0, 1.0))
 
     def _allowed_speed(self, clearance_m: float | None) -> float:
         if clearance_m is None:

@@ -8,22 +8,24 @@ When it says nothing, and when it tells the robot to stand still, is told in `ro
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Path
 from numpy.typing import NDArray
-from sensor_msgs.msg import Range
+from sensor_msgs.msg import Imu, Range
 from std_msgs.msg import Header
 
 from robot_vision.control import CorridorSteering
 from robot_vision.perception import LaneHeading
+from robot_vision.perception.attitude import Lean, lean_from
 from robot_vision.ros import messages, qos
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.join import ExactJoin
 from robot_vision.ros.node import stamp_ns
-from robot_vision.ros.parameters import Setting
+from robot_vision.ros.parameters import CAMERA_PLACE, Setting
 from robot_vision.ros.run import run_node
 from robot_vision.ros.steering import STEERING_SETTINGS, SteeringNode
 
@@ -39,13 +41,22 @@ LIBRARY_SETTINGS = (
     Setting("stop_distance", 0.5, "what is left before an obstacle, m", 0.01, 50.0),
     Setting("yaw_trusted", 0.175, "standard deviation of the yaw beyond which to stop, rad", 0.001, 3.2),
     Setting("offset_trusted", 0.3, "standard deviation beyond which the offset is not used, m", 0.001, 50.0),
+    Setting("lean_slow", 0.14, "lean of the body from which on to slow, rad", 0.01, 3.0),
+    Setting("lean_stop", 0.35, "lean at which to stand still, rad", 0.02, 3.2),
 )
+#: How the camera looks when the robot stands upright: what `attitude` says beyond it is the robot's lean.
+UPRIGHT = tuple(setting for setting in CAMERA_PLACE if setting.name in ("camera.pitch", "camera.roll"))
 
 
 class CorridorSteeringNode(SteeringNode):
-    """`heading`, `path_ahead` and `clearance` to `steering`."""
+    """`heading`, `path_ahead`, `attitude` and `clearance` to `steering`."""
 
-    SETTINGS = (*LIBRARY_SETTINGS, *STEERING_SETTINGS)
+    SETTINGS = (
+        *LIBRARY_SETTINGS,
+        *UPRIGHT,
+        Setting("mind_lean", False, "slow when the body leans; camera.pitch and camera.roll must be right"),
+        *STEERING_SETTINGS,
+    )
     STEERS_BY = "heading"
     ADVICE = "look what vp_estimator says on /diagnostics"
 
@@ -53,8 +64,11 @@ class CorridorSteeringNode(SteeringNode):
         super().__init__("corridor_steering")
         self._corridor = CorridorSteering()
         self._clearance: tuple[int, float] | None = None
+        self._upright = (0.0, 0.0)
+        self._leans: deque[tuple[int, Lean]] = deque(maxlen=2)
         self._on_bends: ExactJoin[Any] = ExactJoin(("heading", "path_ahead"), self._drive)
         self._clearances = self.hear(Range, "clearance", self._hear_clearance, qos.NEWEST)
+        self._attitudes = self.hear(Imu, "attitude", self._hear_attitude, qos.NEWEST)
         self.hear(Path, "path_ahead", self._hear_path, qos.NEWEST)
         self.hear(
             PoseWithCovarianceStamped,
@@ -72,6 +86,7 @@ class CorridorSteeringNode(SteeringNode):
         CorridorSteering(**own)  # refuses what makes no sense
         for name, value in own.items():
             setattr(self._corridor, name, value)
+        self._upright = values["camera.roll"], values["camera.pitch"]
         super().configure(values)
 
     def on_clock_jump_back(self) -> None:
@@ -79,6 +94,7 @@ class CorridorSteeringNode(SteeringNode):
         self._corridor.reset()
         self._on_bends.reset()
         self._clearance = None
+        self._leans.clear()
 
     def reset_steering(self) -> None:
         """Begin from standing."""
@@ -87,11 +103,24 @@ class CorridorSteeringNode(SteeringNode):
     def _hear_clearance(self, message: Range) -> None:
         self._clearance = (stamp_ns(message.header.stamp), messages.clearance_from_message(message))
 
+    def _hear_attitude(self, message: Imu) -> None:
+        lean = lean_from(*messages.attitude_from_message(message), *self._upright)
+        self._leans.append((stamp_ns(message.header.stamp), lean))
+
+    def _lean_before(self, now_ns: int) -> Lean | None:
+        """Lean in the picture before the one steered by: that of this one may come before or after its heading."""
+        if not self.settings["mind_lean"]:
+            return None
+        oldest = now_ns - round(1e9 * self._timeout_s)
+        earlier = [lean for stamp, lean in self._leans if oldest <= stamp < now_ns]
+        return earlier[-1] if earlier else None
+
     def _hear_heading(self, message: PoseWithCovarianceStamped) -> None:
         began = time.perf_counter()
         lane = messages.heading_from_message(message)
         self.follow_time("heading", message.header.stamp)
         self.catch_up(self._clearances)
+        self.catch_up(self._attitudes)
         self._header = message.header
         if not self._enabled:
             return
@@ -117,7 +146,8 @@ class CorridorSteeringNode(SteeringNode):
             self.diagnostics.report(Level.WARN, f"stands still: {refusal}")
             return
         clearance = self._clearance and self._clearance[1]
-        steering = self._corridor.update(lane, 1e-9 * now_ns, clearance, path)
+        lean = self._lean_before(now_ns)
+        steering = self._corridor.update(lane, 1e-9 * now_ns, clearance, path, lean)
         self.obey(steering.speed, steering.turn_rate)
         self.answered(header.stamp, began)
         if steering.reason:

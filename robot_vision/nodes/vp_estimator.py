@@ -7,6 +7,7 @@ when there is something to say.
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -15,6 +16,7 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import CameraInfo, Imu, PointCloud2
 from std_msgs.msg import Header
 
+from robot_vision.perception.attitude import Lean, lean_from
 from robot_vision.perception.odometry import MotionHistory
 from robot_vision.perception.way import Kind, WayEstimate, WayEstimator
 from robot_vision.ros import calibration, messages, qos
@@ -37,8 +39,9 @@ class VpEstimatorNode(VisionNode):
         Setting("lean", 0.035, "usual roll and pitch of the body about its mounting, rad", 0.001, 1.0),
         Setting("lane.narrowest", 0.5, "least width a lane may have, m", 0.05, 100.0),
         Setting("lane.widest", 12.0, "greatest width a lane may have, m", 0.05, 100.0),
+        Setting("lean_warning", 0.2, "lean of the body at which to warn of tipping over, rad", 0.01, 3.2),
         Setting(
-            "way", "auto", "what kind of way; auto: a corridor where walls are seen", choices=tuple(Kind)
+            "way", "auto", "auto: a corridor where walls are seen", choices=tuple(kind.value for kind in Kind)
         ),
         Setting("path_length", 10.0, "length of path_ahead, m; on a road at most 36", 1.0, 100.0),
     )
@@ -128,11 +131,22 @@ class VpEstimatorNode(VisionNode):
         self._say_vanishing_points(header, estimate)
         if estimate.attitude is not None and estimate.attitude.seen:
             self._attitude.publish(messages.attitude_to_message(header, estimate.attitude))
+        lean = self._lean(estimate)
         if lane is None:
             self.diagnostics.report(Level.WARN, estimate.reason, NO_WAY_ADVICE)
+        elif lean is not None and lean.angle >= self.settings["lean_warning"]:
+            tipping = f"may tip over: leans {math.degrees(lean.angle):.0f} degrees ({lean.towards})"
+            self.diagnostics.report(Level.WARN, tipping, "slow down, or look whether camera.pitch is right")
         else:
             known = f"knows heading and offset in a {estimate.frame}"
             self.diagnostics.report(Level.OK, estimate.reason or known)
+
+    def _lean(self, estimate: WayEstimate) -> Lean | None:
+        """Lean of the robot, where the picture tells of it."""
+        attitude, camera = estimate.attitude, self._calibration.camera
+        if attitude is None or not attitude.seen or camera is None:
+            return None
+        return lean_from(attitude.roll, attitude.pitch, camera.roll, camera.pitch)
 
     def _say_vanishing_points(self, header: Header, estimate: WayEstimate | None) -> None:
         found = None if estimate is None else estimate.vanishing_points

@@ -90,7 +90,7 @@ class HeadingEstimator:
                 f"only {len(lines)} lines" if len(lines) < _FEW_LINES else f"none of {len(lines)} lines agree"
             )
             return HeadingEstimate(points, None, None, f"no vanishing point: {few}")
-        attitude = estimate_attitude(points, self.lean)
+        attitude = estimate_attitude(points, self.lean, seen)
         primary = points.of(Role.PRIMARY)
         if primary is None:
             return HeadingEstimate(

@@ -205,6 +205,24 @@ def attitude_to_message(header: Header, attitude: Attitude) -> Imu:
     return message
 
 
+def attitude_from_message(message: Imu) -> tuple[float, float]:
+    """Read roll and pitch (rad) of the `attitude` message.
+
+    Raises:
+        MessageError: its orientation is marked absent, is not finite, or names none.
+    """
+    q = message.orientation
+    check_finite({f"orientation.{axis}": getattr(q, axis) for axis in "xyzw"})
+    if message.orientation_covariance[0] < 0.0:
+        raise MessageError("its orientation is marked as absent (covariance -1)")
+    try:
+        rotation = quaternion_to_rotation((q.x, q.y, q.z, q.w))
+    except ValueError as error:
+        raise MessageError(f"orientation names no direction: {error}") from error
+    roll, pitch, _ = rpy_from_rotation(rotation)
+    return roll, pitch
+
+
 def path_to_message(header: Header, points: ArrayLike, frame: str = "base_link") -> Path:
     """Build a Path in a frame through (N, 2) points (m), each turned towards the next."""
     xy = np.asarray(points, np.float64).reshape(-1, 2)

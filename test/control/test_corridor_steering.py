@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from robot_vision.control import CorridorSteering, Steering
 from robot_vision.control.limits import approach, speed_to_stop_within
 from robot_vision.perception import LaneHeading
+from robot_vision.perception.attitude import Lean, lean_from
 
 PICTURES_PER_SECOND = 15
 STEP = 1 / PICTURES_PER_SECOND
@@ -413,3 +414,24 @@ def test_a_path_that_is_none_is_not_followed():
 def test_a_place_to_keep_that_is_no_number_is_refused():
     with pytest.raises(ValueError, match="keep"):
         CorridorSteering(keep=math.nan)
+
+
+def test_a_body_that_leans_slows_and_stands_before_it_tips_over():
+    lane = LaneHeading(0.0, SURE, 0.0, SURE)
+    speeds = []
+    for angle in np.radians([0.0, 5.0, 10.0, 15.0, 25.0]):
+        law = CorridorSteering(speed=0.6, most_acceleration=20.0)
+        said = law.update(lane, 0.0, lean=Lean(float(angle), "left"))
+        speeds.append(said.speed)
+        assert bool(said.reason) == (angle > law.lean_slow)
+    assert speeds[0] == speeds[1] > speeds[2] > speeds[3] > speeds[4] == 0.0
+    assert "to the left" in said.reason
+    assert CorridorSteering().update(lane, 0.0, lean=Lean(math.nan, "left")).speed == 0.0
+    with pytest.raises(ValueError, match="lean_slow"):
+        CorridorSteering(lean_slow=0.5, lean_stop=0.4)
+
+
+def test_a_lean_is_what_is_left_of_the_attitude_beside_the_mounting():
+    assert lean_from(0.0, 0.1, 0.0, 0.1).angle == pytest.approx(0.0, abs=1e-7)
+    assert lean_from(0.1, 0.1, 0.0, 0.1) == Lean(pytest.approx(0.1, rel=0.01), "right")
+    assert lean_from(0.0, -0.2, 0.0, 0.1) == Lean(pytest.approx(0.3), "back")

@@ -253,3 +253,12 @@ def test_a_road_is_said_in_its_own_frame_with_the_path_along_it(calibrated: Node
     header = send(calibrated, LineSegments.empty())
     calibrated.until(lambda: "no road" in calibrated.state("message"), "it says that there is none")
     assert calibrated.set_parameter("way", "auto").successful
+
+
+def test_a_robot_that_leans_is_warned_of(calibrated: NodeBench) -> None:
+    assert calibrated.set_parameter("camera.roll", 0.3).successful  # so the upright camera leans by as much
+    drive(calibrated, 0.1, 0.0)
+    calibrated.until(lambda: "may tip over" in calibrated.state("message"), "it warns")
+    assert calibrated.set_parameter("camera.roll", 0.0).successful
+    drive(calibrated, 0.1, 0.0)
+    calibrated.until(lambda: "knows heading" in calibrated.state("message"), "it is well again")

@@ -90,8 +90,10 @@ def test_a_road_that_is_lost_is_not_replaced_by_whatever_lines_meet() -> None:
 
 def test_the_path_is_straight_in_a_corridor_and_bends_on_a_road() -> None:
     random = np.random.default_rng(1)
-    walls = seen_lines(Corridor(), 0.2, 0.05, random)
-    straight = WayEstimator(kind=Kind.CORRIDOR).update(walls, INDOORS, 0.0).path
+    estimator, straight = WayEstimator(kind=Kind.CORRIDOR), None
+    for picture in range(8):
+        walls = seen_lines(Corridor(), 0.2, 0.05, random, along=0.05 * picture)
+        straight = estimator.update(walls, INDOORS, picture / RATE).path
     bent = on_a_road(WayEstimator(), 20)[-1].path
     assert straight is not None and bent is not None
     for path, most in ((straight, 1e-9), (bent, None)):
