@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Holds a picture against an earlier one as if all were floor: what stands up moves too far, a shadow does not.
+
+A point at height h is seen by a camera at height H on the floor behind it, H / (H - h) times as far away. When the
+camera moves by t, that image of it moves by t h / (H - h) more than floor would: its *rise* is h / (H - h), whatever
+its distance, below zero for what the floor mirrors. Floor itself rises by nothing: what it seems to rise everywhere is
+the slip of the odometry, what it seems to rise with distance is an error of the pitch.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry.rotation import wrap_angle
+from robot_vision.mapping.ground_view import GroundView
+from robot_vision.mapping.pose import Pose
+
+Array = NDArray[np.float64]
+Gray = NDArray[np.uint8]
+Grid = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+_FEWEST_POINTS = 12
+_WINDOW = (15, 15)
+
+
+@dataclass(frozen=True)
+class Parallax:
+    """What the motion between two pictures tells of the part of a picture that shows ground.
+
+    Attributes:
+        raised: (H, W) by how much better each pixel is explained by something above the floor than by floor, grey
+            levels; negative: floor explains it better.
+        mirrored: (H, W) the same for something below the floor, which only a mirror shows.
+        travelled: between the two pictures, m.
+        slip: share by which odometry tells more motion than the floor shows; nan when the floor shows nothing.
+        pitch_error: by which the pitch of this picture is wrong against that of the earlier one, rad.
+        points: (N, 2) tracked points of the picture, working pixels.
+        moved: (N, 2) how far each has moved over the floor since the earlier picture if it is floor, m ahead and left.
+        rise: (N,) of each, after slip and pitch error.
+    """
+
+    raised: Grid
+    mirrored: Grid
+    travelled: float
+    slip: float
+    pitch_error: float
+    points: Array
+    moved: Array
+    rise: Array
+
+
+@dataclass(frozen=True)
+class _Kept:
+    gray: Gray
+    pose: Pose
+    view: GroundView
+
+
+@dataclass
+class PlaneMotion:
+    """Compares each picture with one from so far back that heights can be told.
+
+    Args:
+        baseline: way after which an earlier picture is worth a comparison, m.
+        longest: way after which it is too different, m.
+        widest: turn after which it is too different, rad.
+        heights: of the planes that are tried, as shares of the camera's height; negative ones are mirrored.
+        window: over which a plane must explain the picture, working pixels.
+        points: tracked from picture to picture at most.
+        memory: pictures kept at most.
+    """
+
+    baseline: float = 0.28
+    longest: float = 2.5
+    widest: float = 0.2
+    heights: tuple[float, ...] = (0.16, 0.32, 0.48, 0.64, -0.8, -4.0)
+    window: int = 9
+    points: int = 150
+    memory: int = 16
+    _kept: deque[_Kept] = field(default_factory=deque, init=False, repr=False)
+
+    def reset(self) -> None:
+        """Forget earlier pictures."""
+        self._kept.clear()
+
+    def compare(self, gray: Gray, pose: Pose, view: GroundView, floor: Mask) -> Parallax | None:
+        """Compare with an earlier picture and keep this one.
+
+        Args:
+            gray: (H, W) the working picture.
+            pose: of the robot in odom.
+            view: of the ground in the working picture.
+            floor: (H - top, W) what looks like floor, to hold the two pictures together by.
+
+        Returns:
+            None while the robot has not moved enough, or has turned too much.
+        """
+        earlier = self._partner(pose, gray.shape)
+        self._keep(_Kept(gray, pose, view))
+        if earlier is None:
+            return None
+        step = earlier.pose.to_here(pose)
+        points, seen_at = self._track(earlier, gray, view, step, floor)
+        slip, pitch_error = self._disagreement(points, seen_at, earlier.view, view, step)
+        held = replace(
+            earlier.view, camera=replace(earlier.view.camera, pitch=earlier.view.camera.pitch - pitch_error)
+        )
+        corrected = step.copy()
+        corrected[:2, 2] *= 1.0 - (0.0 if np.isnan(slip) else slip)
+        raised, mirrored = self._sweep(earlier.gray, gray, held, view, corrected)
+        moved, rise = _over_the_floor(points, seen_at, held, view, corrected)
+        travelled = float(np.hypot(step[0, 2], step[1, 2]))
+        return Parallax(raised, mirrored, travelled, slip, pitch_error, points, moved, rise)
+
+    def _partner(self, pose: Pose, shape: tuple[int, ...]) -> _Kept | None:
+        for kept in reversed(self._kept):
+            way = float(np.hypot(pose.x - kept.pose.x, pose.y - kept.pose.y))
+            turned = abs(wrap_angle(pose.yaw - kept.pose.yaw)) > self.widest
+            if turned or way > self.longest or kept.gray.shape != shape:
+                return None
+            if way >= self.baseline:
+                return kept
+        return None
+
+    def _keep(self, picture: _Kept) -> None:
+        if self._kept:
+            last = self._kept[-1].pose
+            moved = np.hypot(picture.pose.x - last.x, picture.pose.y - last.y)
+            if moved < 0.02 and abs(wrap_angle(picture.pose.yaw - last.yaw)) < 0.01:
+                return
+        self._kept.append(picture)
+        if len(self._kept) > self.memory:
+            self._kept.popleft()
+
+    def _track(
+        self, earlier: _Kept, gray: Gray, view: GroundView, step: Array, floor: Mask
+    ) -> tuple[Array, Array]:
+        """Points (N, 2) of this picture and their places (N, 2) in the earlier one, working pixels.
+
+        The earlier picture is drawn as its floor would look from here, so that little is left to be found
+        (Lucas and Kanade 1981); points that do not come back where they started are left out.
+        """
+        top = view.top
+        here = np.ascontiguousarray(gray[top:])
+        corners = cv2.goodFeaturesToTrack(here, self.points, 0.002, 5, mask=floor.astype(np.uint8), blockSize=3)
+        if corners is None or len(corners) < _FEWEST_POINTS:
+            return np.zeros((0, 2)), np.zeros((0, 2))
+        way = earlier.view.matrix @ step @ view.inverse
+        warped = _drawn(earlier.gray, way, top, here.shape)
+        there, found, _ = cv2.calcOpticalFlowPyrLK(here, warped, corners, None, winSize=_WINDOW, maxLevel=1)
+        again, back, _ = cv2.calcOpticalFlowPyrLK(warped, here, there, None, winSize=_WINDOW, maxLevel=1)
+        corners, there, again = (np.asarray(p, np.float64).reshape(-1, 2) for p in (corners, there, again))
+        good = (found.ravel() > 0) & (back.ravel() > 0) & (np.hypot(*(again - corners).T) < 0.3)
+        source = np.column_stack([there[good] + (0.0, top), np.ones(int(good.sum()))]) @ way.T
+        source = source[:, :2] / source[:, 2:]
+        rows, columns = gray.shape
+        inside = (source > 1).all(axis=1) & (source[:, 0] < columns - 2) & (source[:, 1] < rows - 2)
+        return corners[good][inside] + (0.0, top), source[inside]
+
+    def _disagreement(
+        self, points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array
+    ) -> tuple[float, float]:
+        """Slip of the odometry and error of the pitch, from points that are mostly floor.
+
+        An error d of the pitch moves the floor at x by d (x^2 + H^2) / H. Robust least squares (Cauchy).
+        """
+        moved, rise = _over_the_floor(points, seen_at, before, view, step)
+        if len(rise) < _FEWEST_POINTS:
+            return float("nan"), 0.0
+        way = float(np.hypot(step[0, 2], step[1, 2]))
+        height = view.camera.height_m or 1.0
+        x, _ = view.ground(points[:, 0], points[:, 1])
+        ahead = x - view.camera.x_m
+        lever = (ahead**2 + height**2) / (height * way)
+        precision = 1.0 / (0.03 + 0.02 * lever)
+        unknown, weight = np.zeros(2), np.ones(len(rise))
+        terms = np.column_stack([np.ones_like(lever), lever])
+        prior = np.diag([1.0 / 0.3**2, 1.0 / 0.01**2])
+        for _ in range(6):
+            scaled = terms * (weight * precision**2)[:, None]
+            unknown = np.linalg.solve(scaled.T @ terms + prior, scaled.T @ rise)
+            weight = 1.0 / (1.0 + ((rise - terms @ unknown) * precision) ** 2)
+        return float(unknown[0]), float(unknown[1])
+
+    def _sweep(
+        self, earlier: Gray, gray: Gray, before: GroundView, view: GroundView, step: Array
+    ) -> tuple[Grid, Grid]:
+        """How much better planes above and below explain the picture than the floor: (H, W) each, grey levels."""
+        top = view.top
+        here = gray[top:]
+        size = (self.window, self.window)
+        gain = 1.0
+        costs = []
+        for share in (0.0, *self.heights):
+            way = _raised(before, share).matrix @ step @ _raised(view, share).inverse
+            warped = _drawn(earlier, way, top, here.shape)
+            if share == 0.0:
+                gain = float(here.mean()) / max(float(warped.mean()), 1.0)
+            difference = cv2.absdiff(here, cv2.convertScaleAbs(warped, alpha=gain))
+            costs.append(cv2.boxFilter(difference, cv2.CV_32F, size))
+        floor = costs[0]
+        above = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share > 0.0]
+        below = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share < 0.0]
+        outside = _drawn(np.full(earlier.shape, 255, np.uint8), before.matrix @ step @ view.inverse, top, here.shape, 0)
+        unseen = cv2.erode(outside, np.ones(size, np.uint8)) < 255
+        raised, mirrored = (np.log((floor + 0.7) / (np.minimum.reduce(costs) + 0.7)) for costs in (above, below))
+        raised[unseen] = 0.0
+        mirrored[unseen] = 0.0
+        return raised, mirrored
+
+
+def _over_the_floor(
+    points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array
+) -> tuple[Array, Array]:
+    """How far points have moved over the floor (N, 2), m, if they are floor, and their rise (N,)."""
+    if not len(points):
+        return np.zeros((0, 2)), np.zeros(0)
+    here = np.column_stack(view.ground(points[:, 0], points[:, 1]))
+    there = np.column_stack(before.ground(seen_at[:, 0], seen_at[:, 1]))
+    moved = there - here
+    turn, shift = step[:2, :2], step[:2, 2]
+    expected = (there - shift) @ turn  # the earlier place as this base_link has it
+    onward = turn.T @ shift
+    # A raised point lies farther away as seen from behind: along the way the camera has come.
+    rise = (expected - here) @ onward / float(onward @ onward)
+    good = np.isfinite(rise)
+    moved[~good], rise[~good] = 0.0, 0.0
+    return moved, rise
+
+
+def _raised(view: GroundView, share: float) -> GroundView:
+    """The same view of a plane that lies a share of the camera's height above the floor."""
+    height = (view.camera.height_m or 1.0) * (1.0 - share)
+    return GroundView(replace(view.camera, height_m=height), view.scale)
+
+
+def _drawn(picture: Gray, way: Array, top: int, shape: tuple[int, ...], border: int = cv2.BORDER_REPLICATE) -> Gray:
+    """The earlier picture (H, W) drawn from `top` on by the homography `way` from this picture to it."""
+    drop = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, float(top)], [0.0, 0.0, 1.0]])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    drawn = cv2.warpPerspective(picture, way @ drop, (shape[1], shape[0]), flags=flags, borderMode=border)
+    return np.asarray(drawn)
