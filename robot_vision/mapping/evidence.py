@@ -14,6 +14,9 @@ from robot_vision.mapping.plane_motion import Parallax
 Scores = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
+_FEWEST = 100
+"""Pixels of certain floor, counted one in six, without which nothing is known of a pair of pictures."""
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -21,15 +24,19 @@ class Evidence:
 
     Args:
         likeness: log ratio of appearance that floor must show: where both are as likely it is none.
-        parallax: score for each unit of the log ratio by which a plane above the floor explains a pixel better.
-        certain: log ratio below which parallax says nothing.
+        parallax: score for all of what floor should show and does, or for as much against it.
+        expected: share of what floor usually shows that makes floor as likely as not.
+        clear: share of what floor should show that it must usually show for parallax to count whole.
+        enough: log ratio that floor must be able to show for parallax to count whole.
         mirror: log ratio of a plane below the floor that makes a pixel a reflection, whatever it looks like.
         limit: greatest amount of the score.
     """
 
     likeness: float = 1.0
     parallax: float = 6.0
-    certain: float = 0.25
+    expected: float = 0.4
+    clear: float = 0.6
+    enough: float = 0.5
     mirror: float = 0.3
     limit: float = 3.0
 
@@ -44,12 +51,23 @@ class Evidence:
         if parallax is None:
             return np.asarray(score)
         raised, mirrored = parallax.raised, parallax.mirrored
-        limit, certain = np.float32(self.limit), np.float32(self.certain)
-        stands = np.minimum(np.maximum(raised - certain, 0.0) * np.float32(self.parallax), 2 * limit)
-        lies = np.minimum(np.maximum(-np.maximum(raised, mirrored) - certain, 0.0) * np.float32(self.parallax), 2 * limit)
+        limit = np.float32(self.limit)
+        shown = -raised / np.maximum(parallax.telling, np.float32(0.05))
+        usual = self._usual(shown, likeness, parallax.telling)
+        trust = np.float32(min(max(usual, 0.0) / self.clear, 1.0))
+        weight = trust * np.minimum(parallax.telling / np.float32(self.enough), np.float32(1.0))
+        against = np.float32(self.expected * usual)
+        moves = np.clip((shown - against) * np.float32(self.parallax), -limit, limit) * weight
         shines = (mirrored > self.mirror) & (mirrored > 0.7 * raised)
-        score = np.where(shines, limit, score - stands + lies)
+        score = np.where(shines, limit, score + moves)
         return np.clip(score, -limit, limit)
+
+    def _usual(self, shown: Scores, likeness: Scores, telling: Scores) -> float:
+        """What floor shows in this pair of pictures: less than all where they do not fit each other well."""
+        floor = (likeness[::2, ::3] > self.likeness + 1.0) & (telling[::2, ::3] > self.enough / 2.0)
+        if floor.sum() < _FEWEST:
+            return 0.0
+        return float(np.median(shown[::2, ::3][floor]))
 
 
 def sharp(gray: NDArray[np.uint8], contrast: float, rows: int) -> Mask:

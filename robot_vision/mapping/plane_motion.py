@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -27,6 +28,10 @@ Mask = NDArray[np.bool_]
 
 _FEWEST_POINTS = 12
 _WINDOW = (15, 15)
+_PIXEL = 0.2
+"""How well a tracked point is placed, working pixels."""
+_NOISE = 0.8
+"""Mean difference of two pictures of the same thing, grey levels."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +39,10 @@ class Parallax:
     """What the motion between two pictures tells of the part of a picture that shows ground.
 
     Attributes:
-        raised: (H, W) by how much better each pixel is explained by something above the floor than by floor, grey
-            levels; negative: floor explains it better.
+        raised: (H, W) log ratio by which something above the floor explains each pixel better than floor does;
+            negative: floor explains it better.
         mirrored: (H, W) the same for something below the floor, which only a mirror shows.
+        telling: (H, W) the log ratio in favour of floor that floor of this texture would show; 0: nothing to see.
         travelled: between the two pictures, m.
         slip: share by which odometry tells more motion than the floor shows; nan when the floor shows nothing.
         pitch_error: by which the pitch of this picture is wrong against that of the earlier one, rad.
@@ -47,6 +53,7 @@ class Parallax:
 
     raised: Grid
     mirrored: Grid
+    telling: Grid
     travelled: float
     slip: float
     pitch_error: float
@@ -107,16 +114,13 @@ class PlaneMotion:
             return None
         step = earlier.pose.to_here(pose)
         points, seen_at = self._track(earlier, gray, view, step, floor)
-        slip, pitch_error = self._disagreement(points, seen_at, earlier.view, view, step)
-        held = replace(
-            earlier.view, camera=replace(earlier.view.camera, pitch=earlier.view.camera.pitch - pitch_error)
-        )
-        corrected = step.copy()
-        corrected[:2, 2] *= 1.0 - (0.0 if np.isnan(slip) else slip)
-        raised, mirrored = self._sweep(earlier.gray, gray, held, view, corrected)
+        wrong = _disagreement(points, seen_at, earlier.view, view, step)
+        held, corrected = _corrected(earlier.view, step, wrong)
+        raised, mirrored, telling = self._sweep(earlier.gray, gray, held, view, corrected)
         moved, rise = _over_the_floor(points, seen_at, held, view, corrected)
         travelled = float(np.hypot(step[0, 2], step[1, 2]))
-        return Parallax(raised, mirrored, travelled, slip, pitch_error, points, moved, rise)
+        slip = wrong.slip if len(points) >= _FEWEST_POINTS else float("nan")
+        return Parallax(raised, mirrored, telling, travelled, slip, wrong.pitch, points, moved, rise)
 
     def _partner(self, pose: Pose, shape: tuple[int, ...]) -> _Kept | None:
         for kept in reversed(self._kept):
@@ -163,56 +167,109 @@ class PlaneMotion:
         inside = (source > 1).all(axis=1) & (source[:, 0] < columns - 2) & (source[:, 1] < rows - 2)
         return corners[good][inside] + (0.0, top), source[inside]
 
-    def _disagreement(
-        self, points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array
-    ) -> tuple[float, float]:
-        """Slip of the odometry and error of the pitch, from points that are mostly floor.
-
-        An error d of the pitch moves the floor at x by d (x^2 + H^2) / H. Robust least squares (Cauchy).
-        """
-        moved, rise = _over_the_floor(points, seen_at, before, view, step)
-        if len(rise) < _FEWEST_POINTS:
-            return float("nan"), 0.0
-        way = float(np.hypot(step[0, 2], step[1, 2]))
-        height = view.camera.height_m or 1.0
-        x, _ = view.ground(points[:, 0], points[:, 1])
-        ahead = x - view.camera.x_m
-        lever = (ahead**2 + height**2) / (height * way)
-        precision = 1.0 / (0.03 + 0.02 * lever)
-        unknown, weight = np.zeros(2), np.ones(len(rise))
-        terms = np.column_stack([np.ones_like(lever), lever])
-        prior = np.diag([1.0 / 0.3**2, 1.0 / 0.01**2])
-        for _ in range(6):
-            scaled = terms * (weight * precision**2)[:, None]
-            unknown = np.linalg.solve(scaled.T @ terms + prior, scaled.T @ rise)
-            weight = 1.0 / (1.0 + ((rise - terms @ unknown) * precision) ** 2)
-        return float(unknown[0]), float(unknown[1])
-
     def _sweep(
         self, earlier: Gray, gray: Gray, before: GroundView, view: GroundView, step: Array
-    ) -> tuple[Grid, Grid]:
-        """How much better planes above and below explain the picture than the floor: (H, W) each, grey levels."""
+    ) -> tuple[Grid, Grid, Grid]:
+        """How much better planes above and below explain the picture than the floor, and how much floor would show.
+
+        A plane at a height is drawn by its own homography, so heights are tried without any search.
+        """
         top = view.top
         here = gray[top:]
         size = (self.window, self.window)
-        gain = 1.0
-        costs = []
+        planes = []
         for share in (0.0, *self.heights):
             way = _raised(before, share).matrix @ step @ _raised(view, share).inverse
-            warped = _drawn(earlier, way, top, here.shape)
-            if share == 0.0:
-                gain = float(here.mean()) / max(float(warped.mean()), 1.0)
-            difference = cv2.absdiff(here, cv2.convertScaleAbs(warped, alpha=gain))
-            costs.append(cv2.boxFilter(difference, cv2.CV_32F, size))
-        floor = costs[0]
+            planes.append(_drawn(earlier, way, top, here.shape))
+        gain = float(here.mean()) / max(float(planes[0].mean()), 1.0)
+        planes = [cv2.convertScaleAbs(plane, alpha=gain) for plane in planes]
+        costs = [cv2.boxFilter(cv2.absdiff(here, plane), cv2.CV_32F, size) + _NOISE for plane in planes]
         above = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share > 0.0]
         below = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share < 0.0]
+        raised, mirrored = (np.log(costs[0] / np.minimum.reduce(some)) for some in (above, below))
+        differs = cv2.boxFilter(cv2.absdiff(planes[0], planes[1]), cv2.CV_32F, size)
+        telling = np.log1p(differs / (2.0 * _NOISE))
         outside = _drawn(np.full(earlier.shape, 255, np.uint8), before.matrix @ step @ view.inverse, top, here.shape, 0)
         unseen = cv2.erode(outside, np.ones(size, np.uint8)) < 255
-        raised, mirrored = (np.log((floor + 0.7) / (np.minimum.reduce(costs) + 0.7)) for costs in (above, below))
         raised[unseen] = 0.0
         mirrored[unseen] = 0.0
-        return raised, mirrored
+        telling[unseen] = 0.0
+        return raised, mirrored, telling
+
+
+class Disagreement(NamedTuple):
+    """By what the floor seems to move against odometry and horizon.
+
+    Roll, pitch and yaw (rad) of this picture are wrong by so much against those of the earlier one; the way is wrong
+    by the share `slip`, and by `aside` (m) across it.
+    """
+
+    roll: float
+    pitch: float
+    yaw: float
+    slip: float
+    aside: float
+
+
+_USUAL = Disagreement(roll=0.004, pitch=0.01, yaw=0.01, slip=0.3, aside=0.02)
+"""Standard deviations of what may be wrong, where the floor shows nothing of it."""
+
+
+def _disagreement(
+    points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array
+) -> Disagreement:
+    """What is wrong with odometry and horizon, from points (N, 2) that are mostly floor.
+
+    A pitch wrong by d moves the floor at (X, Y) by d (X^2 + H^2) / H along and d X Y / H aside, a roll by the same
+    with X and Y changed, a yaw by d (-Y, X). Robust least squares (Cauchy).
+    """
+    if len(points) < _FEWEST_POINTS:
+        return Disagreement(0.0, 0.0, 0.0, 0.0, 0.0)
+    camera = view.camera
+    height = camera.height_m or 1.0
+    here = np.column_stack(view.ground(points[:, 0], points[:, 1]))
+    there = np.column_stack(before.ground(seen_at[:, 0], seen_at[:, 1]))
+    turn, shift = step[:2, :2], step[:2, 2]
+    onward = turn.T @ shift
+    error = (there - shift) @ turn - here
+    x, y = here[:, 0] - camera.x_m, here[:, 1]
+    good = np.isfinite(error).all(axis=1) & np.isfinite(x)
+    error, x, y = error[good], x[good], y[good]
+    square, one = height**2, np.ones_like(x)
+    along = np.column_stack(
+        [-x * y, x**2 + square, height * y, -height * onward[0] * one, height * onward[1] * one]
+    )
+    aside = np.column_stack(
+        [-(y**2) - square, x * y, -height * x, -height * onward[1] * one, -height * onward[0] * one]
+    )
+    terms = np.stack([along, aside], axis=1) / height
+    terms[:, :, 4] /= float(np.hypot(*onward))
+    ray = _PIXEL / (camera.fx * view.scale)
+    sigma = ray * np.stack([(x**2 + square) / height, np.sqrt(x**2 + square)], axis=1)
+    prior = np.diag(1.0 / np.array(_USUAL) ** 2)
+    unknown, weight = np.zeros(5), np.ones(len(x))
+    for _ in range(6):
+        scaled = terms * (weight[:, None] / sigma**2)[:, :, None]
+        unknown = np.linalg.solve(
+            np.einsum("nci,ncj->ij", scaled, terms) + prior, np.einsum("nci,nc->i", scaled, error)
+        )
+        rest = (error - terms @ unknown) / sigma
+        weight = 1.0 / (1.0 + (rest**2).sum(axis=1) / 8.0)
+    return Disagreement(*(float(value) for value in unknown))
+
+
+def _corrected(before: GroundView, step: Array, wrong: Disagreement) -> tuple[GroundView, Array]:
+    """The earlier view and the way from there, with what is wrong laid to them."""
+    camera = replace(
+        before.camera, pitch=before.camera.pitch + wrong.pitch, roll=before.camera.roll + wrong.roll
+    )
+    cos, sin = np.cos(wrong.yaw), np.sin(wrong.yaw)
+    way = step[:2, 2]
+    aside = np.array([-way[1], way[0]]) / np.hypot(*way) * wrong.aside
+    better = step.copy()
+    better[:2, :2] = step[:2, :2] @ np.array([[cos, -sin], [sin, cos]]).T
+    better[:2, 2] = way * (1.0 - wrong.slip) - aside
+    return GroundView(camera, before.scale), better
 
 
 def _over_the_floor(
