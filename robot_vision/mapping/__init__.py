@@ -7,7 +7,7 @@ from robot_vision.mapping.mapper import PlanViewEstimate, PlanViewMapper
 from robot_vision.mapping.objects import GroundObject
 from robot_vision.mapping.occupancy import OccupancyMap
 from robot_vision.mapping.plan_view import PlanView
-from robot_vision.mapping.pose import Pose
+from robot_vision.mapping.pose import Pose, PoseHistory
 
 __all__ = [
     "GroundObject",
@@ -19,4 +19,5 @@ __all__ = [
     "PlanViewMapper",
     "PointKind",
     "Pose",
+    "PoseHistory",
 ]

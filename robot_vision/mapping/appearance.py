@@ -89,7 +89,9 @@ def _histogram(lab: Pixels) -> Scores:
     counts = np.bincount(_codes(lab).ravel(), minlength=_BINS**3).astype(np.float32)
     counts /= max(float(counts.sum()), 1.0)
     sheet = counts.reshape(_BINS, _BINS * _BINS)
-    sheet = cv2.GaussianBlur(sheet, (1, 7), 1.0, sigmaY=_LIGHT_SPREAD, borderType=cv2.BORDER_CONSTANT)
+    sheet = np.asarray(
+        cv2.GaussianBlur(sheet, (1, 7), 1.0, sigmaY=_LIGHT_SPREAD, borderType=cv2.BORDER_CONSTANT), np.float32
+    )
     for plane in sheet.reshape(_BINS, _BINS, _BINS):
         if plane.any():
             plane[:] = cv2.GaussianBlur(plane, (5, 5), _COLOUR_SPREAD, borderType=cv2.BORDER_CONSTANT)

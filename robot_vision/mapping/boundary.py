@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the floor before the robot ends, column by column: the continuity of the floor, examined in the picture itself."""
+"""Where the floor before the robot ends, column by column: its continuity, examined in the picture itself."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class BoundaryFinder:
         Amini, Weymouth and Jain 1990, one step a column: the sum of edge strength and cost of bends is least.
         """
         reach = self.snake
-        edge = np.abs(cv2.Scharr(gray, cv2.CV_32F, 0, 1)) / np.float32(32.0)
+        edge = np.asarray(np.abs(cv2.Scharr(gray, cv2.CV_32F, 0, 1)) / 32.0, np.float32)
         offsets = np.arange(-reach, reach + 1)
         base = np.round(place).astype(int)
         rows = np.clip(base[:, None] + offsets, top + 1, gray.shape[0] - 2)

@@ -32,7 +32,9 @@ class Clearance:
         if not np.isfinite(self.front):
             raise ValueError(f"front must be a number of metres, not {self.front}")
 
-    def measure(self, boundary: Boundary, points: VanishingPoints | None, view: GroundView, reach: float) -> float:
+    def measure(
+        self, boundary: Boundary, points: VanishingPoints | None, view: GroundView, reach: float
+    ) -> float:
         """Free floor ahead of the robot's front along the primary direction, m.
 
         Args:
@@ -69,5 +71,3 @@ class Clearance:
             return 0.0
         ahead = view.camera.optical_to_base @ points.directions[primary]
         return float(np.arctan2(ahead[1], ahead[0]))
-
-

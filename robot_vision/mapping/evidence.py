@@ -52,7 +52,7 @@ class Evidence:
             return np.asarray(score)
         raised, mirrored = parallax.raised, parallax.mirrored
         limit = np.float32(self.limit)
-        shown = -raised / np.maximum(parallax.telling, np.float32(0.05))
+        shown = np.asarray(-raised / np.maximum(parallax.telling, np.float32(0.05)), np.float32)
         usual = self._usual(shown, likeness, parallax.telling)
         trust = np.float32(min(max(usual, 0.0) / self.clear, 1.0))
         weight = trust * np.minimum(parallax.telling / np.float32(self.enough), np.float32(1.0))
@@ -60,7 +60,7 @@ class Evidence:
         moves = np.clip((shown - against) * np.float32(self.parallax), -limit, limit) * weight
         shines = (mirrored > self.mirror) & (mirrored > 0.7 * raised)
         score = np.where(shines, limit, score + moves)
-        return np.clip(score, -limit, limit)
+        return np.asarray(np.clip(score, -limit, limit), np.float32)
 
     def _usual(self, shown: Scores, likeness: Scores, telling: Scores) -> float:
         """What floor shows in this pair of pictures: less than all where they do not fit each other well."""

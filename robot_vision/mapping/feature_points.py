@@ -104,7 +104,7 @@ class FeatureAnnotator:
         ahead = x - camera.x_m
         square = ahead**2 + y**2 + height**2
         turn = self.pixel_sigma / camera.fx  # of the ray, rad
-        # A pitch d moves a point by d (X^2 + H^2) / H along and d X Y / H aside, a roll by the same with X and Y changed.
+        # A pitch d moves a point by d (X^2 + H^2) / H along and d X Y / H aside, a roll likewise with X and Y changed.
         by_pitch = np.stack([-(ahead**2 + height**2), -ahead * y], axis=1) / height
         by_roll = np.stack([ahead * y, y**2 + height**2], axis=1) / height
         moves = np.stack([by_roll, by_pitch], axis=2)

@@ -65,7 +65,7 @@ class GroundLines:
         direction = points.directions[primary]
         camera = view.camera
         ends = [camera.rays(lines.endpoints[:, k : k + 2]) for k in (0, 2)]
-        normal = normalised(np.cross(*ends))
+        normal = normalised(np.cross(ends[0], ends[1]))
         leads = np.abs(normal @ direction) < np.sin(self.aside)
         up = camera.optical_to_base[2]
         below = np.maximum(ends[0] @ up, ends[1] @ up) < -0.02  # all of it: no line above can be floor

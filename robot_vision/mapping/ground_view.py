@@ -47,7 +47,7 @@ class GroundView:
         return round(self.camera.height * self.scale), round(self.camera.width * self.scale)
 
     def ground(self, u: NDArray[np.floating], v: NDArray[np.floating]) -> tuple[Array, Array]:
-        """x ahead and y to the left (m, shape of u and v) under working pixels; nan at and above the horizon."""
+        """Metres ahead and to the left (shape of u and v) under working pixels; nan at and above the horizon."""
         m = self.inverse
         depth = m[2, 0] * u + m[2, 1] * v + m[2, 2]
         # In front of the camera the homogeneous coordinate has the sign it has at the bottom of the picture.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From one picture after the other to a map of the floor: the stages of Table 20.1 in their order, one object, one verb."""
+"""From picture after picture to a map of the floor: the stages of Table 20.1 in their order, one object, one verb."""
 
 from __future__ import annotations
 
@@ -91,6 +91,7 @@ class PlanViewMapper:
     Args:
         reach: farthest floor spoken of, m.
         trusted: relative error of a distance beyond which nothing is said; it limits the reach, too.
+        unchecked: weight in the map of a picture that could not be held against an earlier one.
         slip: share of the way that odometry may be wrong by before its pictures stay out of the map.
         horizon, appearance, motion, evidence, shadows, finder, lines, objects, maker, clearance, features, map:
             the stages.
@@ -101,6 +102,7 @@ class PlanViewMapper:
 
     reach: float = 7.0
     trusted: float = 0.2
+    unchecked: float = 0.25
     slip: float = 0.1
     horizon: HorizonFilter = field(default_factory=HorizonFilter)
     appearance: FloorAppearance = field(default_factory=FloorAppearance)
@@ -118,7 +120,7 @@ class PlanViewMapper:
     _unlike: Pose | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("reach", "trusted", "slip"):
+        for name in ("reach", "trusted", "unchecked", "slip"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} must be a positive number, not {value}")
@@ -170,12 +172,14 @@ class PlanViewMapper:
             raise ValueError(f"the picture is {size}, but the camera's are {camera.width} x {camera.height}")
         horizon = self.horizon.update(camera, points, stamp_s, pitch_rate)
         working = _half(picture)
-        gray = cv2.cvtColor(working, cv2.COLOR_BGR2GRAY)
+        gray = np.asarray(cv2.cvtColor(working, cv2.COLOR_BGR2GRAY), np.uint8)
         unreadable = _unreadable(gray)
         if unreadable:
             return self._nothing(horizon, unreadable)
         if not horizon.steady:
-            return self._nothing(horizon, "the vanishing points contradict the horizon: was the camera knocked?")
+            return self._nothing(
+                horizon, "the vanishing points contradict the horizon: was the camera knocked?"
+            )
         view = GroundView(horizon.camera, 0.5)
         reach = min(self.reach, horizon.reach(self.trusted))
         return self._look(working, gray, lines, points, view, reach, horizon, pose)
@@ -202,16 +206,20 @@ class PlanViewMapper:
     ) -> PlanViewEstimate:
         top = view.top
         lower = working[top:]
-        lab = cv2.cvtColor(cv2.GaussianBlur(working, (0, 0), 0.8), cv2.COLOR_BGR2LAB)
+        lab = np.asarray(cv2.cvtColor(cv2.GaussianBlur(working, (0, 0), 0.8), cv2.COLOR_BGR2LAB), np.uint8)
         strange = self._learn(lower, lab, view, pose)
-        likeness = cv2.blur(self.appearance.score(lab[top:]), (3, 3))
+        likeness = np.asarray(cv2.blur(self.appearance.score(lab[top:]), (3, 3)), np.float32)
         parallax = None
         if pose is not None:
             parallax = self.motion.compare(gray, pose, view, likeness > self.evidence.likeness)
         score = self.evidence.score(likeness, parallax)
         shadow = self.shadows.find(lower, score, parallax)
         score[shadow] = 1.0
-        kinds = self.lines.sort(lines, points, score, view) if points is not None else np.zeros(len(lines), np.intp)
+        kinds = (
+            self.lines.sort(lines, points, score, view)
+            if points is not None
+            else np.zeros(len(lines), np.intp)
+        )
         boundary = self.finder.find(score, sharp(gray, 4.0, 4)[top:], gray, view, reach)
         borders = lines.endpoints[kinds == LineKind.BORDER]
         straight = self.lines.straighten(boundary, borders, view)
@@ -221,7 +229,7 @@ class PlanViewMapper:
         reason = strange or self._doubt(horizon, pose, slip)
         mapped = pose is not None and not strange and not abs(slip) > self.slip
         if mapped and pose is not None:
-            self.map.update(seen, pose)
+            self.map.update(seen, pose, 1.0 if parallax is not None else self.unchecked)
         return PlanViewEstimate(
             plan_view=self.maker.draw(seen),
             clearance=self.clearance.measure(straight, points, view, reach),
@@ -273,7 +281,9 @@ class PlanViewMapper:
             return f"the camera has been knocked by {np.degrees(horizon.knocked):.1f} degrees"
         if abs(slip) > self.slip:
             more = "more" if slip > 0.0 else "less"
-            return f"odometry tells {abs(slip):.0%} {more} way than the floor shows: nothing goes into the map"
+            return (
+                f"odometry tells {abs(slip):.0%} {more} way than the floor shows: nothing goes into the map"
+            )
         if pose is None:
             return "no odometry: a plan of each picture, but no map"
         return ""

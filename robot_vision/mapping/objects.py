@@ -71,5 +71,7 @@ class ObjectFinder:
             if width > self.widest:
                 continue
             near = float(np.median(distance[left:after]))
-            found.append(GroundObject(int(left), right, float(np.median(x)), float(np.median(y)), width, near))
+            found.append(
+                GroundObject(int(left), right, float(np.median(x)), float(np.median(y)), width, near)
+            )
         return found

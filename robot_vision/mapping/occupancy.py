@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping.plan_view import FREE, OCCUPIED, UNKNOWN, PlanView, Seen
 from robot_vision.mapping.pose import Pose
 
@@ -28,6 +29,7 @@ class OccupancyMap:
         near: distance at which a picture counts half of that, m: farther off it sees worse.
         limit: greatest amount of the log-odds: what changes must be seen to change.
         known: log-odds below which a cell is unknown.
+        moved: way (m) or turn (rad) after which a picture tells something new: the same view counts once.
     """
 
     size: float = 40.0
@@ -37,6 +39,8 @@ class OccupancyMap:
     near: float = 4.0
     limit: float = 4.0
     known: float = 0.6
+    moved: tuple[float, float] = (0.02, 0.02)
+    _last: Pose | None = field(default=None, init=False, repr=False)
     _odds: LogOdds = field(init=False, repr=False)
     _corner: NDArray[np.int64] | None = field(default=None, init=False, repr=False)
 
@@ -46,7 +50,9 @@ class OccupancyMap:
             if not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} must be a positive number, not {value}")
         if self.size < 20 * self.resolution:
-            raise ValueError(f"size must be 20 cells or more, not {self.size:g} m of {self.resolution:g} m cells")
+            raise ValueError(
+                f"size must be 20 cells or more, not {self.size:g} m of {self.resolution:g} m cells"
+            )
         self._side = round(self.size / self.resolution)
         self._odds = np.zeros((self._side, self._side), np.float32)
 
@@ -54,19 +60,26 @@ class OccupancyMap:
         """Forget everything."""
         self._odds[:] = 0.0
         self._corner = None
+        self._last = None
 
     @property
     def empty(self) -> bool:
         """Whether nothing has been seen yet."""
         return self._corner is None
 
-    def update(self, seen: Seen, pose: Pose) -> None:
-        """Take in one picture.
+    def update(self, seen: Seen, pose: Pose, trust: float = 1.0) -> None:
+        """Take in one picture, unless the robot stands where the last one was taken.
 
         Args:
             seen: what it says, in base_link.
             pose: of base_link in odom.
+            trust: share of its usual weight.
         """
+        if self._last is not None:
+            way = np.hypot(pose.x - self._last.x, pose.y - self._last.y)
+            if way < self.moved[0] and abs(wrap_angle(pose.yaw - self._last.yaw)) < self.moved[1]:
+                return
+        self._last = pose
         corner = self._move(pose)
         rows, columns = self._rectangle(seen, pose, corner)
         y, x = np.meshgrid(
@@ -77,7 +90,7 @@ class OccupancyMap:
         cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
         ahead, left = (cos * x + sin * y), (cos * y - sin * x)
         cells = seen.at(ahead, left)
-        weight = 1.0 / (1.0 + (np.hypot(ahead, left) / self.near) ** 2)
+        weight = trust / (1.0 + (np.hypot(ahead, left) / self.near) ** 2)
         part = self._odds[rows, columns]
         part += np.where(cells == OCCUPIED, self.taken, np.where(cells == FREE, -self.free, 0.0)) * weight
         np.clip(part, -self.limit, self.limit, out=part)

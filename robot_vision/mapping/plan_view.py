@@ -62,7 +62,9 @@ class Seen:
         behind = away - self.boundary.distance[column]
         ended = self.boundary.ended[column]
         free = inside & (behind < np.where(ended, -self.margin, 0.0)) & (away < self.reach)
-        taken = inside & ended & (behind >= -self.margin / 2) & (behind < self.thickness) & (away < self.reach)
+        taken = (
+            inside & ended & (behind >= -self.margin / 2) & (behind < self.thickness) & (away < self.reach)
+        )
         cells = np.full(np.shape(x), UNKNOWN, np.int8)
         cells[free] = FREE
         cells[taken] = OCCUPIED

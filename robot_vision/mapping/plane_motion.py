@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -152,13 +152,15 @@ class PlaneMotion:
         """
         top = view.top
         here = np.ascontiguousarray(gray[top:])
-        corners = cv2.goodFeaturesToTrack(here, self.points, 0.002, 5, mask=floor.astype(np.uint8), blockSize=3)
+        corners = cv2.goodFeaturesToTrack(
+            here, self.points, 0.002, 5, mask=floor.astype(np.uint8), blockSize=3
+        )
         if corners is None or len(corners) < _FEWEST_POINTS:
             return np.zeros((0, 2)), np.zeros((0, 2))
         way = earlier.view.matrix @ step @ view.inverse
         warped = _drawn(earlier.gray, way, top, here.shape)
-        there, found, _ = cv2.calcOpticalFlowPyrLK(here, warped, corners, None, winSize=_WINDOW, maxLevel=1)
-        again, back, _ = cv2.calcOpticalFlowPyrLK(warped, here, there, None, winSize=_WINDOW, maxLevel=1)
+        there, found = _flow(here, warped, corners)
+        again, back = _flow(warped, here, there)
         corners, there, again = (np.asarray(p, np.float64).reshape(-1, 2) for p in (corners, there, again))
         good = (found.ravel() > 0) & (back.ravel() > 0) & (np.hypot(*(again - corners).T) < 0.3)
         source = np.column_stack([there[good] + (0.0, top), np.ones(int(good.sum()))]) @ way.T
@@ -182,19 +184,34 @@ class PlaneMotion:
             way = _raised(before, share).matrix @ step @ _raised(view, share).inverse
             planes.append(_drawn(earlier, way, top, here.shape))
         gain = float(here.mean()) / max(float(planes[0].mean()), 1.0)
-        planes = [cv2.convertScaleAbs(plane, alpha=gain) for plane in planes]
+        planes = [np.asarray(cv2.convertScaleAbs(plane, alpha=gain), np.uint8) for plane in planes]
         costs = [cv2.boxFilter(cv2.absdiff(here, plane), cv2.CV_32F, size) + _NOISE for plane in planes]
         above = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share > 0.0]
         below = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share < 0.0]
         raised, mirrored = (np.log(costs[0] / np.minimum.reduce(some)) for some in (above, below))
         differs = cv2.boxFilter(cv2.absdiff(planes[0], planes[1]), cv2.CV_32F, size)
         telling = np.log1p(differs / (2.0 * _NOISE))
-        outside = _drawn(np.full(earlier.shape, 255, np.uint8), before.matrix @ step @ view.inverse, top, here.shape, 0)
+        outside = _drawn(
+            np.full(earlier.shape, 255, np.uint8), before.matrix @ step @ view.inverse, top, here.shape, 0
+        )
         unseen = cv2.erode(outside, np.ones(size, np.uint8)) < 255
         raised[unseen] = 0.0
         mirrored[unseen] = 0.0
         telling[unseen] = 0.0
         return raised, mirrored, telling
+
+
+def _flow(first: Gray, second: Gray, corners: Any) -> tuple[Any, Any]:
+    """Places of corners (N, 1, 2) of the first picture in the second, and which were found."""
+    places, found, _ = cv2.calcOpticalFlowPyrLK(
+        first,
+        second,
+        corners,
+        None,  # type: ignore[call-overload]
+        winSize=_WINDOW,
+        maxLevel=1,
+    )
+    return places, found
 
 
 class Disagreement(NamedTuple):
@@ -297,7 +314,9 @@ def _raised(view: GroundView, share: float) -> GroundView:
     return GroundView(replace(view.camera, height_m=height), view.scale)
 
 
-def _drawn(picture: Gray, way: Array, top: int, shape: tuple[int, ...], border: int = cv2.BORDER_REPLICATE) -> Gray:
+def _drawn(
+    picture: Gray, way: Array, top: int, shape: tuple[int, ...], border: int = cv2.BORDER_REPLICATE
+) -> Gray:
     """The earlier picture (H, W) drawn from `top` on by the homography `way` from this picture to it."""
     drop = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, float(top)], [0.0, 0.0, 1.0]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP

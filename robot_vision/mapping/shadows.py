@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds what is only dark on the floor: all colours dimmed alike, the texture of the floor kept, no part standing up."""
+"""Finds what is only dark on the floor: all colours dimmed alike, floor all around it, no part standing up."""
 
 from __future__ import annotations
 
