@@ -213,7 +213,7 @@ class PlanViewMapper:
         if pose is not None:
             parallax = self.motion.compare(gray, pose, view, likeness > self.evidence.likeness)
         score = self.evidence.score(likeness, parallax)
-        shadow = self.shadows.find(lower, score, parallax)
+        shadow = self.shadows.find(lower, score, view, parallax)
         score[shadow] = 1.0
         kinds = (
             self.lines.sort(lines, points, score, view)
