@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,9 @@ from robot_vision.perception import LineSegments, Role, VanishingPoints
 Array = NDArray[np.float64]
 Scores = NDArray[np.float32]
 
-_SAMPLES = 12
+_SAMPLES, _ACROSS = 24, 5
+_RIM = (0.02, 0.07)
+"""Strip beside a line that a shadow's edge has in shadow, m: a shadow need not be wider."""
 
 
 class LineKind(IntEnum):
@@ -33,22 +37,29 @@ class GroundLines:
     """Sorts the lines of a picture.
 
     Only the primary vanishing point counts. A line that leads there lies on the floor if it lies below the horizon
-    and has floor on a side; where it has floor on one side only, the floor ends at it. All others are irrelevant.
+    and has floor on a side; where it has floor on one side and clearly less of it on the other, the floor ends at it. All others are irrelevant.
 
     Args:
         aside: greatest angle by which a line may miss the vanishing point, rad.
-        beside: distance from a line at which its sides are looked at, working pixels.
-        share: part of its length along which a side must be floor, or must not be.
+        strip: distance from a line of the strips of ground on its sides that are looked at, from and to, m.
+        step: difference of the mean score of these strips that makes a line a border.
+        doubtful: mean score of the worse one above which it is floor whatever the other one is.
         snap: distance over which the end of the floor is drawn to a border, working pixels.
     """
 
     aside: float = float(np.deg2rad(1.0))
-    beside: float = 3.0
-    share: float = 0.7
+    strip: tuple[float, float] = (0.03, 0.16)
+    step: float = 0.9
+    doubtful: float = 1.8
     snap: float = 2.5
 
     def sort(
-        self, lines: LineSegments, points: VanishingPoints, score: Scores, view: GroundView
+        self,
+        lines: LineSegments,
+        points: VanishingPoints,
+        score: Scores,
+        dim: NDArray[np.bool_],
+        view: GroundView,
     ) -> NDArray[np.intp]:
         """Give a `LineKind` for each line (N,).
 
@@ -56,6 +67,7 @@ class GroundLines:
             lines: of the picture, rectified pixels.
             points: its vanishing points.
             score: (H - view.top, W) positive for floor, of the working picture.
+            dim: (H - view.top, W) what has the colour of floor in shadow: a shadow's edge is no border.
             view: of the ground in the working picture.
         """
         kinds = np.zeros(len(lines), np.intp)
@@ -72,10 +84,16 @@ class GroundLines:
         chosen = np.flatnonzero(leads & below)
         if not len(chosen):
             return kinds
-        left, right = self._sides(lines.endpoints[chosen] * view.scale, score, view.top)
-        floor, none = self.share, 1.0 - self.share
-        kinds[chosen[(left > floor) | (right > floor)]] = LineKind.GROUND
-        kinds[chosen[((left > floor) & (right < none)) | ((right > floor) & (left < none))]] = LineKind.BORDER
+        ends_px = lines.endpoints[chosen] * view.scale + (view.scale - 1.0) / 2.0
+        left, right = self._sides(ends_px, score, view, self.strip)
+        floor = np.fmax(left, right) > 0.0
+        step = np.abs(left - right) > self.step
+        worse = np.fmin(left, right)
+        dark = np.where(left < right, *self._sides(ends_px, dim.astype(np.float32), view, _RIM))
+        rim = np.where(left < right, *self._sides(ends_px, score, view, _RIM))
+        ends_here = (rim < -0.5) | ((worse < self.doubtful) & (dark < 0.4))
+        kinds[chosen[floor]] = LineKind.GROUND
+        kinds[chosen[floor & step & ends_here]] = LineKind.BORDER
         return kinds
 
     def straighten(self, boundary: Boundary, ends: Array, view: GroundView) -> Boundary:
@@ -95,17 +113,53 @@ class GroundLines:
             nearest[closer] = off[closer]
         return Boundary.at(rows, boundary.ended, view)
 
-    def _sides(self, ends: Array, score: Scores, top: int) -> tuple[Array, Array]:
-        """Shares (N,) of the length of lines (N, 4) beside which floor lies, on either side."""
-        part = np.linspace(0.1, 0.9, _SAMPLES)[:, None]
+    def cut(
+        self, lines: LineSegments, kinds: NDArray[np.intp], score: Scores, view: GroundView
+    ) -> NDArray[np.bool_]:
+        """Strips (H - view.top, W) along the borders on the side that is no floor.
+
+        A low kerb of the floor's own colour is told by its whole length at once, where single pixels cannot tell.
+        """
+        strips = np.zeros(score.shape, np.uint8)
+        chosen = np.flatnonzero(kinds == LineKind.BORDER)
+        if not len(chosen):
+            return strips.astype(bool)
+        ends = lines.endpoints[chosen] * view.scale + (view.scale - 1.0) / 2.0
+        left, right = self._sides(ends, score, view, self.strip)
+        away = np.where(left < right, -1.0, 1.0)
+        for (u1, v1, u2, v2), side in zip(ends, away, strict=True):
+            reach = [side * self.strip[1] * self._per_metre(u, v, view) for u, v in ((u1, v1), (u2, v2))]
+            corners = [(u1, v1), (u2, v2), (u2 + reach[1], v2), (u1 + reach[0], v1)]
+            outline = np.round(np.array(corners) - (0.0, view.top)).astype(np.int32)
+            cv2.fillPoly(strips, [outline], 1)
+        return strips.astype(bool)
+
+    def _sides(
+        self, ends: Array, score: Scores, view: GroundView, strip: tuple[float, float]
+    ) -> tuple[Array, Array]:
+        """Mean score (N,) of the strips of ground to the left and to the right of lines (N, 4), working pixels."""
+        part = np.linspace(0.05, 0.95, _SAMPLES)[:, None]
         u = ends[:, 0] + part * (ends[:, 2] - ends[:, 0])
         v = ends[:, 1] + part * (ends[:, 3] - ends[:, 1])
-        along = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
-        across = np.stack([ends[:, 1] - ends[:, 3], ends[:, 2] - ends[:, 0]]) / np.maximum(along, 1e-6)
+        scale = self._per_metre(u, v, view)
         height, width = score.shape
-        shares = []
-        for side in (-self.beside, self.beside):
-            column = np.clip(np.round(u + side * across[0]), 0, width - 1).astype(int)
-            row = np.clip(np.round(v + side * across[1]) - top, 0, height - 1).astype(int)
-            shares.append(np.asarray((score[row, column] > 0.0).mean(axis=0)))
-        return shares[0], shares[1]
+        row = np.round(v - view.top).astype(int)
+        means = []
+        for side in (-1.0, 1.0):
+            places = u + side * np.linspace(*strip, _ACROSS)[:, None, None] * scale
+            column = np.round(places).astype(int)
+            inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+            values = score[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+            count = inside.sum(axis=(0, 1))
+            # Beside the picture nothing is known: such a side is like the other one.
+            mean = np.where(inside, values, 0.0).sum(axis=(0, 1)) / np.maximum(count, 1)
+            means.append(np.where(count >= _SAMPLES, mean, np.nan))
+        left, right = means
+        return np.where(np.isnan(left), right, left), np.where(np.isnan(right), left, right)
+
+    @staticmethod
+    def _per_metre(u: Any, v: Any, view: GroundView) -> Any:
+        """Pixels that a metre across the way covers on the ground at pixels (u, v): y / H (20.3)."""
+        slope = (view.horizon_rows[-1] - view.horizon_rows[0]) / (len(view.horizon_rows) - 1)
+        below = v - (view.horizon_rows[0] + slope * u)
+        return np.maximum(below, 0.0) / (view.camera.height_m or 1.0)

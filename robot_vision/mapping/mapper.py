@@ -215,11 +215,10 @@ class PlanViewMapper:
         score = self.evidence.score(likeness, parallax)
         shadow = self.shadows.find(lower, score, view, parallax)
         score[shadow] = 1.0
-        kinds = (
-            self.lines.sort(lines, points, score, view)
-            if points is not None
-            else np.zeros(len(lines), np.intp)
-        )
+        kinds = np.zeros(len(lines), np.intp)
+        if points is not None:
+            kinds = self.lines.sort(lines, points, score, self.shadows.dim(lower), view)
+        score[self.lines.cut(lines, kinds, score, view)] = -1.0
         boundary = self.finder.find(score, sharp(gray, 4.0, 4)[top:], gray, view, reach)
         borders = lines.endpoints[kinds == LineKind.BORDER]
         straight = self.lines.straighten(boundary, borders, view)

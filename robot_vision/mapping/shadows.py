@@ -69,6 +69,17 @@ class ShadowFinder:
         else:
             self._floor = share * self._floor + (1 - share) * lit
 
+    def dim(self, bgr: Pixels) -> Mask:
+        """Which pixels (H, W) have the colour of floor in shadow; none before the floor's colour is known."""
+        if self._floor is None:
+            return np.zeros(bgr.shape[:2], bool)
+        left = _LINEAR[bgr] / np.maximum(self._floor, 1e-3)
+        blue, green, red = left[..., 0], left[..., 1], left[..., 2]
+        mean = (blue + green + red) / np.float32(3.0)
+        spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
+        dim = (mean > self.darkest) & (mean < self.lightest) & (spread < self.tint * mean)
+        return np.asarray(dim & (red - blue < self.warmth * mean))
+
     def find(self, bgr: Pixels, score: Scores, view: GroundView, parallax: Parallax | None) -> Mask:
         """Which pixels (H, W) that do not look like floor are floor in shadow.
 
@@ -79,15 +90,7 @@ class ShadowFinder:
             parallax: of the same part, None without an earlier picture.
         """
         shadow = np.zeros(score.shape, bool)
-        if self._floor is None:
-            return shadow
-        left = _LINEAR[bgr] / np.maximum(self._floor, 1e-3)
-        blue, green, red = left[..., 0], left[..., 1], left[..., 2]
-        mean = (blue + green + red) / np.float32(3.0)
-        spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
-        dim = (mean > self.darkest) & (mean < self.lightest) & (spread < self.tint * mean)
-        dim &= red - blue < self.warmth * mean
-        dim &= score < 0.0
+        dim = self.dim(bgr) & (score < 0.0)
         count, patches, stats, _ = cv2.connectedComponentsWithStats(dim.astype(np.uint8), connectivity=4)
         if count < 2:
             return shadow
