@@ -37,7 +37,8 @@ class GroundLines:
     """Sorts the lines of a picture.
 
     Only the primary vanishing point counts. A line that leads there lies on the floor if it lies below the horizon
-    and has floor on a side; where it has floor on one side and clearly less of it on the other, the floor ends at it. All others are irrelevant.
+    and has floor on a side; where it has floor on one side and clearly less of it on the other, the
+    floor ends at it. All others are irrelevant.
 
     Args:
         aside: greatest angle by which a line may miss the vanishing point, rad.

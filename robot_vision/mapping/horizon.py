@@ -57,6 +57,9 @@ class HorizonFilter:
         restless: growth of the lean's variance where nobody tells its rate, rad^2/s.
         guided: the same where odometry tells it, rad^2/s.
         sharing: factor on the variance of one picture: errors of lines stay the same for several pictures.
+        line_floor: what the lines of one picture can tell of the lean at best, rad.
+        motion_floor: what the motion of the floor can tell of the pitch at best, rad.
+        motion_sharing: factor on the variance of that: the same points are seen in several pictures.
         gate: squared Mahalanobis distance (2 degrees of freedom) beyond which a picture is not believed.
         knock: change of the lean below which a contradiction is noise, rad.
         confirmations: contradicting pictures in a row after which they are believed.
@@ -66,6 +69,9 @@ class HorizonFilter:
     restless: float = 4e-4
     guided: float = 4e-6
     sharing: float = 2.0
+    line_floor: float = 0.0016
+    motion_floor: float = 0.0015
+    motion_sharing: float = 4.0
     gate: float = 25.0
     knock: float = 0.015
     confirmations: int = 6
@@ -96,7 +102,10 @@ class HorizonFilter:
         if points is not None and len(points):
             told = estimate_attitude(replace(points, camera=camera.rectified()), _LOOSE)
             if told.seen:
-                measured, noise = np.array([told.roll, told.pitch]), self.sharing * told.covariance
+                measured, noise = (
+                    np.array([told.roll, told.pitch]),
+                    self.sharing * (told.covariance + self.line_floor**2 * np.eye(2)),
+                )
                 off = measured - self._lean
                 distance = float(off @ np.linalg.solve(self._covariance + noise, off))
                 if distance > self.gate and np.abs(off).max() > self.knock:
@@ -114,6 +123,22 @@ class HorizonFilter:
         roll, pitch = (float(angle) for angle in self._lean)
         leaning = replace(camera.rectified(), roll=roll, pitch=pitch)
         return Horizon(leaning, self._covariance.copy(), steady, knocked)
+
+    def correct(self, pitch_error: float, sigma: float) -> None:
+        """Take in what the motion of the floor tells of the pitch, for the pictures to come.
+
+        Args:
+            pitch_error: by which the pitch last told is too large, rad.
+            sigma: standard deviation of that, rad.
+        """
+        if self._lean is None:
+            return
+        noise = self.motion_sharing * (sigma**2 + self.motion_floor**2)
+        if pitch_error**2 > self.gate * (self._covariance[1, 1] + noise):
+            return
+        gain = self._covariance[:, 1] / (self._covariance[1, 1] + noise)
+        self._lean = self._lean - gain * pitch_error
+        self._covariance = self._covariance - np.outer(gain, self._covariance[1])
 
     def _predict(self, camera: Camera, stamp_s: float, pitch_rate: float | None) -> None:
         seconds = stamp_s - self._stamp

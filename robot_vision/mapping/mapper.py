@@ -212,6 +212,8 @@ class PlanViewMapper:
         parallax = None
         if pose is not None:
             parallax = self.motion.compare(gray, pose, view, likeness > self.evidence.likeness)
+        if parallax is not None and np.isfinite(parallax.slip):
+            self.horizon.correct(parallax.pitch_error, parallax.pitch_sigma)
         score = self.evidence.score(likeness, parallax)
         shadow = self.shadows.find(lower, score, view, parallax)
         score[shadow] = 1.0

@@ -28,6 +28,8 @@ Mask = NDArray[np.bool_]
 
 _FEWEST_POINTS = 12
 _WINDOW = (15, 15)
+_LANE = (14.0, 2.0)
+"""Length and half width of the ground that is tracked, as multiples of the camera's height."""
 _PIXEL = 0.2
 """How well a tracked point is placed, working pixels."""
 _NOISE = 0.8
@@ -45,7 +47,8 @@ class Parallax:
         telling: (H, W) the log ratio in favour of floor that floor of this texture would show; 0: nothing to see.
         travelled: between the two pictures, m.
         slip: share by which odometry tells more motion than the floor shows; nan when the floor shows nothing.
-        pitch_error: by which the pitch of this picture is wrong against that of the earlier one, rad.
+        pitch_error: by which the pitch of this picture is wrong as far as the motion of the floor tells, rad.
+        pitch_sigma: standard deviation of that, rad.
         points: (N, 2) tracked points of the picture, working pixels.
         moved: (N, 2) how far each has moved over the floor since the earlier picture if it is floor, m ahead and left.
         rise: (N,) of each, after slip and pitch error.
@@ -57,6 +60,7 @@ class Parallax:
     travelled: float
     slip: float
     pitch_error: float
+    pitch_sigma: float
     points: Array
     moved: Array
     rise: Array
@@ -115,12 +119,24 @@ class PlaneMotion:
         step = earlier.pose.to_here(pose)
         points, seen_at = self._track(earlier, gray, view, step, floor)
         wrong = _disagreement(points, seen_at, earlier.view, view, step)
-        held, corrected = _corrected(earlier.view, step, wrong)
-        raised, mirrored, telling = self._sweep(earlier.gray, gray, held, view, corrected)
-        moved, rise = _over_the_floor(points, seen_at, held, view, corrected)
+        held, here, corrected = _corrected(earlier.view, view, step, wrong)
+        raised, mirrored, telling = self._sweep(earlier.gray, gray, held, here, view.top, corrected)
+        moved, _ = _over_the_floor(points, seen_at, earlier.view, view, step)
+        _, rise = _over_the_floor(points, seen_at, held, here, corrected)
         travelled = float(np.hypot(step[0, 2], step[1, 2]))
         slip = wrong.slip if len(points) >= _FEWEST_POINTS else float("nan")
-        return Parallax(raised, mirrored, telling, travelled, slip, wrong.pitch, points, moved, rise)
+        return Parallax(
+            raised,
+            mirrored,
+            telling,
+            travelled,
+            slip,
+            wrong.pitch + wrong.common,
+            wrong.common_sigma,
+            points,
+            moved,
+            rise,
+        )
 
     def _partner(self, pose: Pose, shape: tuple[int, ...]) -> _Kept | None:
         for kept in reversed(self._kept):
@@ -152,9 +168,8 @@ class PlaneMotion:
         """
         top = view.top
         here = np.ascontiguousarray(gray[top:])
-        corners = cv2.goodFeaturesToTrack(
-            here, self.points, 0.002, 5, mask=floor.astype(np.uint8), blockSize=3
-        )
+        lane = floor.astype(np.uint8) * _lane(view)
+        corners = cv2.goodFeaturesToTrack(here, self.points, 0.002, 5, mask=lane, blockSize=3)
         if corners is None or len(corners) < _FEWEST_POINTS:
             return np.zeros((0, 2)), np.zeros((0, 2))
         way = earlier.view.matrix @ step @ view.inverse
@@ -170,13 +185,12 @@ class PlaneMotion:
         return corners[good][inside] + (0.0, top), source[inside]
 
     def _sweep(
-        self, earlier: Gray, gray: Gray, before: GroundView, view: GroundView, step: Array
+        self, earlier: Gray, gray: Gray, before: GroundView, view: GroundView, top: int, step: Array
     ) -> tuple[Grid, Grid, Grid]:
         """How much better planes above and below explain the picture than the floor, and how much floor would show.
 
         A plane at a height is drawn by its own homography, so heights are tried without any search.
         """
-        top = view.top
         here = gray[top:]
         size = (self.window, self.window)
         planes = []
@@ -214,6 +228,20 @@ def _flow(first: Gray, second: Gray, corners: Any) -> tuple[Any, Any]:
     return places, found
 
 
+def _lane(view: GroundView) -> Gray:
+    """1 in the part (H - top, W) of the picture that shows the ground on which the robot is to drive, else 0.
+
+    Verges and kerbs that look like floor lie higher; seen along the way, that would pass for an error of the pitch.
+    """
+    height = view.camera.height_m or 1.0
+    near, far, aside = view.camera.x_m + 0.8 * height, view.camera.x_m + _LANE[0] * height, _LANE[1] * height
+    u, v = view.pixels(np.array([near, near, far, far]), np.array([aside, -aside, -aside, aside]))
+    lane = np.zeros((view.shape[0] - view.top, view.shape[1]), np.uint8)
+    if np.isfinite(u).all():
+        cv2.fillPoly(lane, [np.round(np.column_stack([u, v - view.top])).astype(np.int32)], 1)
+    return lane
+
+
 class Disagreement(NamedTuple):
     """By what the floor seems to move against odometry and horizon.
 
@@ -226,9 +254,11 @@ class Disagreement(NamedTuple):
     yaw: float
     slip: float
     aside: float
+    common: float = 0.0
+    common_sigma: float = float("inf")
 
 
-_USUAL = Disagreement(roll=0.004, pitch=0.01, yaw=0.01, slip=0.3, aside=0.02)
+_USUAL = (0.004, 0.01, 0.01, 0.01, 0.02, 0.05)
 """Standard deviations of what may be wrong, where the floor shows nothing of it."""
 
 
@@ -238,7 +268,8 @@ def _disagreement(
     """What is wrong with odometry and horizon, from points (N, 2) that are mostly floor.
 
     A pitch wrong by d moves the floor at (X, Y) by d (X^2 + H^2) / H along and d X Y / H aside, a roll by the same
-    with X and Y changed, a yaw by d (-Y, X). Robust least squares (Cauchy).
+    with X and Y changed, a yaw by d (-Y, X). A pitch that is wrong in both pictures makes way that grows with
+    distance, a slip the same way everywhere. Robust least squares (Cauchy).
     """
     if len(points) < _FEWEST_POINTS:
         return Disagreement(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -259,34 +290,41 @@ def _disagreement(
     aside = np.column_stack(
         [-(y**2) - square, x * y, -height * x, -height * onward[1] * one, -height * onward[0] * one]
     )
-    terms = np.stack([along, aside], axis=1) / height
+    xp, yp = there[good, 0] - camera.x_m, there[good, 1]
+    common = np.column_stack([-(xp**2 - x**2), -(xp * yp - x * y)]) @ turn
+    terms = np.concatenate([np.stack([along, aside], axis=1), common[:, :, None]], axis=2) / height
     terms[:, :, 4] /= float(np.hypot(*onward))
     ray = _PIXEL / (camera.fx * view.scale)
     sigma = ray * np.stack([(x**2 + square) / height, np.sqrt(x**2 + square)], axis=1)
     prior = np.diag(1.0 / np.array(_USUAL) ** 2)
-    unknown, weight = np.zeros(5), np.ones(len(x))
+    information, unknown, weight = prior, np.zeros(len(_USUAL)), np.ones(len(x))
     for _ in range(6):
         scaled = terms * (weight[:, None] / sigma**2)[:, :, None]
-        unknown = np.linalg.solve(
-            np.einsum("nci,ncj->ij", scaled, terms) + prior, np.einsum("nci,nc->i", scaled, error)
-        )
+        information = np.einsum("nci,ncj->ij", scaled, terms) + prior
+        unknown = np.linalg.solve(information, np.einsum("nci,nc->i", scaled, error))
         rest = (error - terms @ unknown) / sigma
         weight = 1.0 / (1.0 + (rest**2).sum(axis=1) / 8.0)
-    return Disagreement(*(float(value) for value in unknown))
+    sigma_common = float(np.sqrt(np.linalg.inv(information)[5, 5]))
+    return Disagreement(*(float(value) for value in unknown), sigma_common)
 
 
-def _corrected(before: GroundView, step: Array, wrong: Disagreement) -> tuple[GroundView, Array]:
-    """The earlier view and the way from there, with what is wrong laid to them."""
-    camera = replace(
-        before.camera, pitch=before.camera.pitch + wrong.pitch, roll=before.camera.roll + wrong.roll
+def _corrected(
+    before: GroundView, view: GroundView, step: Array, wrong: Disagreement
+) -> tuple[GroundView, GroundView, Array]:
+    """Both views and the way between them, with what is wrong put right."""
+    earlier = replace(
+        before.camera,
+        pitch=before.camera.pitch + wrong.pitch - wrong.common,
+        roll=before.camera.roll + wrong.roll,
     )
+    later = replace(view.camera, pitch=view.camera.pitch - wrong.common)
     cos, sin = np.cos(wrong.yaw), np.sin(wrong.yaw)
     way = step[:2, 2]
     aside = np.array([-way[1], way[0]]) / np.hypot(*way) * wrong.aside
     better = step.copy()
     better[:2, :2] = step[:2, :2] @ np.array([[cos, -sin], [sin, cos]]).T
     better[:2, 2] = way * (1.0 - wrong.slip) - aside
-    return GroundView(camera, before.scale), better
+    return GroundView(earlier, before.scale), GroundView(later, view.scale), better
 
 
 def _over_the_floor(

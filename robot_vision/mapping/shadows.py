@@ -91,7 +91,8 @@ class ShadowFinder:
         """
         shadow = np.zeros(score.shape, bool)
         dim = self.dim(bgr) & (score < 0.0)
-        count, patches, stats, _ = cv2.connectedComponentsWithStats(dim.astype(np.uint8), connectivity=4)
+        count, found, table, _ = cv2.connectedComponentsWithStats(dim.astype(np.uint8), connectivity=4)
+        patches, stats = np.asarray(found, np.int32), np.asarray(table, np.int32)
         if count < 2:
             return shadow
         # What reaches up to the horizon stands: no shadow on the floor does.
