@@ -21,6 +21,7 @@ BENCHMARKS = {
     "kitti": "the way ahead on a real road, through the real nodes",
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
+    "plan_view": "plan and map of the floor: simulated drives, a real road, cost",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "latency": "from picture to steering at 30 Hz, processes over DDS",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",

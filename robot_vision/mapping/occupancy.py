@@ -63,6 +63,11 @@ class OccupancyMap:
         self._last = None
 
     @property
+    def nbytes(self) -> int:
+        """Memory that the cells take, bytes."""
+        return self._odds.nbytes
+
+    @property
     def empty(self) -> bool:
         """Whether nothing has been seen yet."""
         return self._corner is None

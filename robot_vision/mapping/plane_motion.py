@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 _FEWEST_POINTS = 12
 _WINDOW = (15, 15)
-_LANE = (14.0, 2.0)
+_LANE = (14.0, 1.6)
 """Length and half width of the ground that is tracked, as multiples of the camera's height."""
 _PIXEL = 0.2
 """How well a tracked point is placed, working pixels."""
@@ -50,7 +50,8 @@ class Parallax:
         pitch_error: by which the pitch of this picture is wrong as far as the motion of the floor tells, rad.
         pitch_sigma: standard deviation of that, rad.
         points: (N, 2) tracked points of the picture, working pixels.
-        moved: (N, 2) how far each has moved over the floor since the earlier picture if it is floor, m ahead and left.
+        moved: (N, 2) how far each has moved over the floor since the earlier picture if it is floor, m ahead and left,
+            with the lean of this picture as it was told and that of the earlier one as the floor's motion has it.
         rise: (N,) of each, after slip and pitch error.
     """
 
@@ -121,7 +122,8 @@ class PlaneMotion:
         wrong = _disagreement(points, seen_at, earlier.view, view, step)
         held, here, corrected = _corrected(earlier.view, view, step, wrong)
         raised, mirrored, telling = self._sweep(earlier.gray, gray, held, here, view.top, corrected)
-        moved, _ = _over_the_floor(points, seen_at, earlier.view, view, step)
+        told, _, _ = _corrected(earlier.view, view, step, wrong._replace(common=0.0))
+        moved, _ = _over_the_floor(points, seen_at, told, view, step)
         _, rise = _over_the_floor(points, seen_at, held, here, corrected)
         travelled = float(np.hypot(step[0, 2], step[1, 2]))
         slip = wrong.slip if len(points) >= _FEWEST_POINTS else float("nan")
@@ -305,7 +307,7 @@ def _disagreement(
         rest = (error - terms @ unknown) / sigma
         weight = 1.0 / (1.0 + (rest**2).sum(axis=1) / 8.0)
     sigma_common = float(np.sqrt(np.linalg.inv(information)[5, 5]))
-    return Disagreement(*(float(value) for value in unknown), sigma_common)
+    return Disagreement._make([*(float(value) for value in unknown), sigma_common])
 
 
 def _corrected(
