@@ -47,6 +47,7 @@ class BoundaryFinder:
     Args:
         least_height: of a thing worth the name, m; by (20.1) it covers y h / H rows at y rows below the horizon.
         least_rows: fewer rows than this are noise wherever they lie, px.
+        covered: share of the ground's rows which, without floor from the bottom of the picture on, need no edge.
         doubt: mean score below which those rows are no floor.
         median: columns over which a single one is outvoted; insignificant inconsistencies are 3 to 5 px.
         snake: rows by which the boundary may move to the edge it belongs to, px of the working picture.
@@ -55,6 +56,7 @@ class BoundaryFinder:
 
     least_height: float = 0.07
     least_rows: int = 3
+    covered: float = 0.25
     doubt: float = 0.2
     median: int = 5
     snake: int = 3
@@ -105,10 +107,22 @@ class BoundaryFinder:
         np.cumsum(score, axis=0, out=total[1:])
         index = np.arange(height)
         window = (total[index + 1] - total[index + 1 - need]) / need[:, None]
-        gap = (window < self.doubt) & (score < self.doubt) & hard
+        gap = (window < self.doubt) & (score < self.doubt) & (hard | self._from_below(score))
         gap[: self.least_rows] = False
         lowest = height - 1 - np.argmax(gap[::-1], axis=0)
         return np.where(gap.any(axis=0), top + lowest, top - 1)
+
+    def _from_below(self, score: Scores) -> Mask:
+        """The lowest rows (H, W) of columns that begin without floor: the foot of what stands there is below them.
+
+        What is shorter than that is the glare of a lamp.
+        """
+        height = len(score)
+        part = max(round(self.covered * height), 1)
+        bare = (score[height - part :] < self.doubt).all(axis=0)
+        rows = np.zeros(score.shape, bool)
+        rows[height - part :, bare] = True
+        return rows
 
     def _snap(self, place: Array, gray: NDArray[np.uint8], top: int) -> Array:
         """Move the boundary to the edge near it as one line: an active contour solved by dynamic programming.

@@ -147,6 +147,8 @@ class HorizonFilter:
             self._lean = np.array([camera.roll, camera.pitch])
             self._covariance = self.lean**2 * np.eye(2)
             return
+        if self._against:  # what contradicts must not win by waiting
+            return
         growth = np.array([self.restless, self.restless if pitch_rate is None else self.guided])
         self._lean = self._lean + np.array([0.0, 0.0 if pitch_rate is None else pitch_rate * seconds])
         self._covariance = np.minimum(self._covariance + np.diag(growth * seconds), self.lean**2 * 4.0)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.geometry import Camera
+from robot_vision.geometry import Camera, GroundPlane
 from robot_vision.mapping.appearance import FloorAppearance
 from robot_vision.mapping.boundary import Boundary, BoundaryFinder
 from robot_vision.mapping.clearance import Clearance
@@ -167,6 +167,7 @@ class PlanViewMapper:
             GroundPlaneError: height or focal length of the camera are not known.
         """
         camera = camera.rectified()
+        GroundPlane(camera).check_metric()
         if picture.shape[:2] != (camera.height, camera.width):
             size = f"{picture.shape[1]} x {picture.shape[0]}"
             raise ValueError(f"the picture is {size}, but the camera's are {camera.width} x {camera.height}")
@@ -233,7 +234,7 @@ class PlanViewMapper:
             self.map.update(seen, pose, 1.0 if parallax is not None else self.unchecked)
         return PlanViewEstimate(
             plan_view=self.maker.draw(seen),
-            clearance=self.clearance.measure(straight, points, view, reach),
+            clearance=0.0 if strange else self.clearance.measure(straight, points, view, reach),
             objects=self.objects.find(straight, on_border, view),
             horizon=horizon,
             mapped=mapped,

@@ -119,14 +119,18 @@ class PlaneMotion:
             return None
         step = earlier.pose.to_here(pose)
         points, seen_at = self._track(earlier, gray, view, step, floor)
-        wrong = _disagreement(points, seen_at, earlier.view, view, step)
+        # Odometry is believed to a per cent, unless the floor contradicts it outright.
+        loose = _disagreement(points, seen_at, earlier.view, view, step, _LOOSE_SLIP)
+        wrong = loose
+        if abs(loose.slip) < _OUTRIGHT:
+            wrong = _disagreement(points, seen_at, earlier.view, view, step, _USUAL[3])
         held, here, corrected = _corrected(earlier.view, view, step, wrong)
         raised, mirrored, telling = self._sweep(earlier.gray, gray, held, here, view.top, corrected)
         told, _, _ = _corrected(earlier.view, view, step, wrong._replace(common=0.0))
         moved, _ = _over_the_floor(points, seen_at, told, view, step)
         _, rise = _over_the_floor(points, seen_at, held, here, corrected)
         travelled = float(np.hypot(step[0, 2], step[1, 2]))
-        slip = wrong.slip if len(points) >= _FEWEST_POINTS else float("nan")
+        slip = loose.slip if len(points) >= _FEWEST_POINTS else float("nan")
         return Parallax(
             raised,
             mirrored,
@@ -262,12 +266,14 @@ class Disagreement(NamedTuple):
 
 _USUAL = (0.004, 0.01, 0.01, 0.01, 0.02, 0.05)
 """Standard deviations of what may be wrong, where the floor shows nothing of it."""
+_LOOSE_SLIP, _OUTRIGHT = 0.3, 0.15
+"""Standard deviation with which a slip is looked for, and the slip that is taken for one."""
 
 
 def _disagreement(
-    points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array
+    points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array, slip: float
 ) -> Disagreement:
-    """What is wrong with odometry and horizon, from points (N, 2) that are mostly floor.
+    """What is wrong with odometry and horizon, from points (N, 2) that are mostly floor; `slip` is how much usually is.
 
     A pitch wrong by d moves the floor at (X, Y) by d (X^2 + H^2) / H along and d X Y / H aside, a roll by the same
     with X and Y changed, a yaw by d (-Y, X). A pitch that is wrong in both pictures makes way that grows with
@@ -298,7 +304,9 @@ def _disagreement(
     terms[:, :, 4] /= float(np.hypot(*onward))
     ray = _PIXEL / (camera.fx * view.scale)
     sigma = ray * np.stack([(x**2 + square) / height, np.sqrt(x**2 + square)], axis=1)
-    prior = np.diag(1.0 / np.array(_USUAL) ** 2)
+    usual = np.array(_USUAL)
+    usual[3] = slip
+    prior = np.diag(1.0 / usual**2)
     information, unknown, weight = prior, np.zeros(len(_USUAL)), np.ones(len(x))
     for _ in range(6):
         scaled = terms * (weight[:, None] / sigma**2)[:, :, None]
