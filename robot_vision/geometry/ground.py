@@ -78,6 +78,14 @@ class GroundPlane:
         """
         return vanishing_line(self.camera, self.up)
 
+    def check_metric(self) -> None:
+        """Look whether this camera can measure the ground.
+
+        Raises:
+            GroundPlaneError: when the height or the focal length of the camera is not known.
+        """
+        self._metric_transform()
+
     def from_pixels(self, pixels: ArrayLike) -> FloatArray:
         """Give the ground points (N, 2), metres in base_link, under pixels (N, 2) (20.1)-(20.3).
 

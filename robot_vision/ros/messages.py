@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import Imu, PointCloud2, PointField, Range
 from std_msgs.msg import Header
 
+from robot_vision.geometry import Camera
 from robot_vision.geometry.rotation import (
     quaternion_from_rotation,
     quaternion_to_rotation,
@@ -139,6 +140,37 @@ def vanishing_points_to_message(header: Header, found: VanishingPoints | None) -
         points["id"] = found.ids
         points["role"] = found.roles
     return cloud_from_points(header, points)
+
+
+def vanishing_points_from_message(cloud: PointCloud2, camera: Camera) -> VanishingPoints:
+    """Read the `vanishing_points` message; which line belongs to which point is not in it.
+
+    Args:
+        cloud: the message.
+        camera: of the picture.
+
+    Raises:
+        MessageError: fields are missing, or a number is not finite.
+    """
+    points = points_from_cloud(cloud, ("x", "y", "z", "sigma", "weight", "id", "role"))
+    for name in ("x", "y", "z", "sigma", "weight"):
+        bad = np.flatnonzero(~np.isfinite(points[name]))
+        if len(bad):
+            raise MessageError(f"{name} of vanishing point {bad[0]} is {points[name][bad[0]]}")
+    directions = np.column_stack([points[name].astype(np.float64) for name in "xyz"])
+    length = np.linalg.norm(directions, axis=1)
+    if (length < 1e-6).any():
+        raise MessageError(f"vanishing point {int(np.argmin(length))} has no direction")
+    sigma = np.maximum(points["sigma"].astype(np.float64), 1e-6)
+    return VanishingPoints(
+        directions=directions / length[:, None],
+        covariance=sigma[:, None, None] ** 2 * np.eye(2),
+        weight=points["weight"].astype(np.float64),
+        roles=points["role"].astype(np.uint32),
+        ids=points["id"].astype(np.uint32),
+        labels=np.zeros(0, np.intp),
+        camera=camera,
+    )
 
 
 def heading_to_message(
