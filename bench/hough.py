@@ -41,10 +41,10 @@ class HoughFinder:
     def __init__(
         self,
         blur: float = 0.8,
-        levels: Sequence[tuple[float, float]] = ((10.0, 5.0), (4.5, 2.25)),
+        levels: Sequence[tuple[float, float]] = ((18.0, 6.0), (8.0, 2.7)),
         enough: int = 120,
-        min_length: float = 15.0,
-        max_gap: int = 4,
+        min_length: float = 20.0,
+        max_gap: int = 3,
         votes: int = 30,
     ) -> None:
         self._blur = blur
