@@ -18,6 +18,7 @@ from bench.sources import ROOT, MissingSetError
 
 BENCHMARKS = {
     "york": "vanishing points of single real pictures",
+    "folds": "the same with settings chosen on other pictures",
     "kitti": "the way ahead on a real road, through the real nodes",
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
     "calibration": "focal length, mounting and height from a drive; what flagstones add",

@@ -107,7 +107,8 @@ class VanishingPointEstimator:
         )
         along = 20.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         lines = LineSegments.from_endpoints(np.concatenate([middles - along, middles + along], axis=1))
-        self.estimate(lines, Camera(500.0, 500.0, 320.0, 240.0, 640, 480), np.array([0.0, 0.0, 1.0]))
+        for camera in (Camera(500.0, 500.0, 320.0, 240.0, 640, 480), Camera.uncalibrated(640, 480)):
+            self.estimate(lines, camera, np.array([0.0, 0.0, 1.0]))
 
     def _members_and_focal_length(
         self, bundle: Bundle, camera: Camera
