@@ -25,9 +25,9 @@ from robot_vision.planning.grid import (
 
 _SLACK = 1e-6
 """Cells; lengths that differ by less are equal."""
-_FIRST_GUESS, _FIRST_MARGIN = 1.1, 2.0
+_FIRST_GUESS, _FIRST_MARGIN = 1.3, 2.0
 """A way is first looked for up to this multiple of the straight line, and so many cells more."""
-_WIDER = 1.7
+_WIDER = 2.2
 """Then up to so many times that length."""
 
 
@@ -89,15 +89,18 @@ def distance_field(
     distance = np.full(grid.shape, np.inf)
     if robot is None:
         _spread(grid, place, None, False, np.inf, distance, _NO_ROOTS)
-    else:
-        for bound in _bounds(place, robot):
-            window = _window(grid.shape, (place, place), bound)
-            _spread(grid, place, robot, False, bound, distance, _NO_ROOTS, window)
-            if distance[robot] <= bound + _SLACK or _is_whole(window, grid.shape):
-                distance[window][distance[window] > distance[robot] + _SLACK] = np.inf
-                break
-            distance[window] = np.inf
-    distance *= resolution
+        return _in_metres(distance, resolution)
+    for bound in _bounds(place, robot):
+        window = _window(grid.shape, (place, place), bound)
+        end, shape = _inside(window, robot), _shape(window)
+        if shape == grid.shape:
+            bound = np.inf
+        part = np.full(shape, np.inf)
+        _spread(grid[window], _inside(window, place), end, False, bound, part, _NO_ROOTS)
+        if part[end] <= bound + _SLACK:
+            part[part > part[end] + _SLACK] = np.inf
+            distance[window] = _in_metres(part, resolution)
+            break
     return distance
 
 
@@ -110,8 +113,7 @@ def exact_field(free: ArrayLike, goal: Sequence[float], resolution: float = 1.0)
     grid, place, _ = _checked(free, goal, resolution, None)
     distance, roots = np.full(grid.shape, np.inf), np.zeros(grid.shape, np.int32)
     corners, before = _spread(grid, place, None, False, np.inf, distance, roots)
-    distance *= resolution
-    return ExactField(distance, roots, corners, before, resolution)
+    return ExactField(_in_metres(distance, resolution), roots, corners, before, resolution)
 
 
 def shortest_way(free: ArrayLike, start: Sequence[float], goal: Sequence[float]) -> NDArray[np.float64]:
@@ -133,16 +135,18 @@ def shortest_way(free: ArrayLike, start: Sequence[float], goal: Sequence[float])
         return np.array([begin, end], np.float64)
     for bound in _bounds(end, begin):
         window = _window(grid.shape, (begin, end), bound)
-        shape = (window[0].stop - window[0].start, window[1].stop - window[1].start)
+        shape = _shape(window)
+        if shape == grid.shape:
+            bound = np.inf
         distance, roots = np.full(shape, np.inf), np.zeros(shape, np.int32)
-        offset = window[0].start, window[1].start
-        ends = [(cell[0] - offset[0], cell[1] - offset[1]) for cell in (begin, end)]
-        corners, before = _spread(grid[window], ends[1], ends[0], True, bound, distance, roots)
-        if distance[ends[0]] <= bound + _SLACK or _is_whole(window, grid.shape):
+        first, last = _inside(window, begin), _inside(window, end)
+        corners, before = _spread(grid[window], last, first, True, bound, distance, roots)
+        if distance[first] <= bound + _SLACK:
             break
-    if not np.isfinite(distance[ends[0]]):
+    if not np.isfinite(distance[first]):
         raise NoWayError(f"no way leads from {begin} to {end}: walls lie between them")
-    return ExactField(distance, roots, corners, before, 1.0).way_from(ends[0]) + offset
+    way = ExactField(distance, roots, corners, before, 1.0).way_from(first)
+    return way + (window[0].start, window[1].start)
 
 
 _NO_ROOTS = np.zeros((0, 0), np.int32)
@@ -179,8 +183,19 @@ def _window(shape: tuple[int, ...], ends: tuple[Cell, Cell], bound: float) -> _W
     )
 
 
-def _is_whole(window: _Window, shape: tuple[int, ...]) -> bool:
-    return all(part.start == 0 and part.stop == size for part, size in zip(window, shape, strict=True))
+def _shape(window: _Window) -> tuple[int, int]:
+    return window[0].stop - window[0].start, window[1].stop - window[1].start
+
+
+def _inside(window: _Window, cell: Cell) -> Cell:
+    """The same cell counted from the window's corner."""
+    return cell[0] - window[0].start, cell[1] - window[1].start
+
+
+def _in_metres(distance: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
+    if resolution != 1.0:
+        distance *= resolution
+    return distance
 
 
 def _spread(
@@ -191,25 +206,9 @@ def _spread(
     bound: float,
     distance: NDArray[np.float64],
     roots: NDArray[np.int32],
-    window: _Window | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Call the kernel on a window of the grid; returns corners (N, 2) and what comes before each."""
+    """Call the kernel; returns corners (N, 2) row, column and what comes before each."""
     from robot_vision.planning.spreading import spread  # numba: slow to import
 
-    window = window or (slice(0, free.shape[0]), slice(0, free.shape[1]))
-    top, left = window[0].start, window[1].start
-    inside = (-1, -1) if target is None else (target[0] - top, target[1] - left)
-    part = np.ascontiguousarray(distance[window])
-    place = spread(
-        padded(free[window]),
-        (goal[0] - top, goal[1] - left),
-        inside,
-        heads_for_target,
-        np.inf if _is_whole(window, free.shape) else bound,
-        part,
-        roots,
-    )
-    if not np.shares_memory(part, distance):
-        distance[window] = part
-    corners = place[:, 1::-1] * 0.5 - 1.5 + (top, left)
-    return corners, place[:, 2].copy()
+    place = spread(padded(free), goal, target or (-1, -1), heads_for_target, bound, distance, roots)
+    return place[:, 1::-1] * 0.5 - 1.5, place[:, 2].copy()
