@@ -20,7 +20,6 @@ from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.sensitivity import PRESETS
 from robot_vision.perception.crop_rows.tracker import RowEstimate, RowTracker
 from robot_vision.perception.odometry import MotionHistory
-from robot_vision.perception.picture import PictureError
 from robot_vision.perception.vegetation import INDICES, VegetationMask
 from robot_vision.ros import calibration, messages, qos
 from robot_vision.ros.calibration import Calibration
@@ -142,7 +141,7 @@ class CropRowSteeringNode(SteeringNode):
             self._watch.reset()
         try:
             estimate = self._look(message)
-        except (PictureError, CalibrationMissingError) as cause:
+        except ValueError as cause:
             topic = "camera_info" if isinstance(cause, CalibrationMissingError) else self._topic
             self.complain(topic, str(cause), getattr(cause, "advice", ""))
             if self._enabled:

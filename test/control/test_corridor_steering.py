@@ -363,3 +363,20 @@ def test_braking_curve_is_the_parabola(distance, deceleration):
     speed = speed_to_stop_within(distance, deceleration)
     assert speed**2 / (2 * deceleration) == pytest.approx(distance)
     assert speed_to_stop_within(-distance, deceleration) == 0.0
+
+
+@pytest.mark.parametrize("curvature", [0.03, -0.2])
+def test_on_the_centre_line_of_a_bend_it_turns_with_the_bend(curvature: float) -> None:
+    law = CorridorSteering(speed=1.0)
+    for step in range(60):
+        command = law.update(LaneHeading(0.0, SURE, 0.0, SURE, 2.0, curvature), step * STEP)
+    assert command.turn_rate == pytest.approx(command.speed * curvature, rel=0.03)
+
+
+@pytest.mark.parametrize("curvature", [math.nan, math.inf, -1e300])
+def test_a_curvature_beyond_sense_keeps_the_limits(curvature: float) -> None:
+    law = CorridorSteering()
+    for step in range(10):
+        command = law.update(LaneHeading(0.0, SURE, 0.0, SURE, 2.0, curvature), step * STEP)
+        assert math.isfinite(command.turn_rate)
+        assert abs(command.turn_rate) <= law.most_turn_rate

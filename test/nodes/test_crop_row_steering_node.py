@@ -160,6 +160,17 @@ def test_a_picture_of_another_size_is_refused(bench: NodeBench, field: list[Mome
     bench.log_line("/image/compressed", "320 x 240")
 
 
+def test_a_grey_picture_has_no_green(bench: NodeBench, field: list[Moment]) -> None:
+    import cv2
+
+    grey = cv2.imencode(".jpg", np.full((480, 640), 120, np.uint8))[1].tobytes()
+    bench.say_surely("camera_info", CameraInfo(**CAMERA.camera_info()))
+    assert bench.set_parameter("vegetation", "green").successful
+    assert is_still(see(bench, field[0], grey))
+    bench.log_line("/image/compressed", "infrared")
+    assert bench.set_parameter("vegetation", "auto").successful
+
+
 def test_the_service_stops_and_releases_it(bench: NodeBench, field: list[Moment]) -> None:
     start_anew(bench)
     see(bench, field[0])
@@ -221,7 +232,7 @@ def test_raw_pictures_without_odometry_an_overlay_and_silence(field: list[Moment
                 overlay = bench.answer("rows/overlay", header)
                 assert (np.frombuffer(overlay.data, np.uint8).reshape(240, 320, 3) != small).any()
             bench.until(lambda: is_still(bench.said("steering")[-1]), "it stands when pictures stop")
-            assert "no picture" in bench.state("message")
+            bench.until(lambda: "no picture" in bench.state("message"), "diagnostics say so")
         finally:
             bench.close()
 
