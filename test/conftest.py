@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from robot_vision.places import shared_file
 
@@ -14,6 +15,16 @@ from robot_vision.places import shared_file
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(shared_file("config/transport.xml"))
+
+# How fast a busy machine is says nothing of the code. In CI every run draws the same examples, so that a change is
+# judged by what it changes; elsewhere each run looks at new ones.
+settings.register_profile(
+    "any machine",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=bool(os.environ.get("CI")),
+)
+settings.load_profile("any machine")
 
 
 @pytest.fixture(scope="module")

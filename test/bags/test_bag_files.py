@@ -98,7 +98,7 @@ def test_chunks_carry_checksums(tmp_path: Path) -> None:
     assert all(chunk.uncompressed_crc == zlib.crc32(chunk.data) for chunk in chunks)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(times=st.lists(st.integers(0, 50), min_size=1, max_size=80), chunk=st.integers(1, 3000))
 def test_messages_are_in_log_time_order_and_equal_times_in_order_of_writing(
     tmp_path_factory: pytest.TempPathFactory, times: list[int], chunk: int
@@ -159,7 +159,7 @@ def test_every_cut_of_a_bag_gives_a_prefix_or_plain_words(tmp_path: Path) -> Non
             assert got == written[: len(got)]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data(), compression=st.sampled_from(["none", "lz4", "zstd"]))
 def test_no_flipped_byte_brings_the_reader_down_or_a_wrong_message_in(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject, compression: str

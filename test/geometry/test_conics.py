@@ -73,20 +73,20 @@ def holes(draw: st.DrawFn, narrowest: float = 0.3) -> Hole:
     return hole(camera, normal, ray, radius, draw(numbers(narrowest, 1.0)), draw(angles))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes())
 def test_the_pole_of_the_vanishing_line_is_the_projected_centre(hole):
     assert projected_centre(hole.conic, hole.line) == pytest.approx(hole.centre, rel=1e-9)
     assert projected_centre(-7.0 * hole.conic, -0.01 * hole.line) == pytest.approx(hole.centre, rel=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes())
 def test_tangent_chords_meet_at_the_projected_centre(hole):
     assert centre_by_tangents(hole.conic, hole.line) == pytest.approx(hole.centre, rel=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes(), numbers(-1.5, 1.5))
 def test_every_chord_of_contact_passes_through_the_pole(hole, azimuth):
     line = hole.line
@@ -110,7 +110,7 @@ def test_every_chord_of_contact_passes_through_the_pole(hole, azimuth):
     assert abs(aside) < 1e-8 * ellipse.major
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(numbers(0.05, 1.0), numbers(0.02, 0.2), numbers(-0.2, 0.2))
 def test_the_shift_of_a_circle_straight_ahead_is_b_squared_over_d(tilt, radius, height):
     camera = Camera(500.0, 500.0, 320.0, 240.0, 640, 480)
@@ -126,7 +126,7 @@ def test_the_shift_of_a_circle_straight_ahead_is_b_squared_over_d(tilt, radius, 
     assert vanishing_offset(vertical + shift, 2.0 * vertical) == pytest.approx(vertical + d, rel=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes())
 def test_across_the_vanishing_line_the_shift_of_any_ellipse_is_b_squared_over_d(hole):
     ellipse, line = ImageEllipse.from_conic(hole.conic), hole.line
@@ -136,7 +136,7 @@ def test_across_the_vanishing_line_the_shift_of_any_ellipse_is_b_squared_over_d(
     assert across == pytest.approx(-np.sign(d) * centre_shift(extent, abs(d)), rel=1e-6, abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes())
 def test_along_its_axes_an_ellipse_is_two_cases_of_one_dimension(hole):
     # Problem 2: b is the semi-axis and d the way to the vanishing line, both along the same axis.
@@ -151,7 +151,7 @@ def test_along_its_axes_an_ellipse_is_two_cases_of_one_dimension(hole):
     assert ellipse.centre + shift == pytest.approx(hole.centre, rel=1e-8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes())
 def test_an_ellipse_and_its_conic_say_the_same(hole):
     ellipse = ImageEllipse.from_conic(hole.conic)
@@ -161,7 +161,7 @@ def test_an_ellipse_and_its_conic_say_the_same(hole):
     assert np.einsum("ni,ij,nj->n", on_it, ellipse.conic, on_it) == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(holes(narrowest=1.0))
 def test_a_circle_fits_two_planes_of_which_one_is_its_own(hole):
     normals = circle_normals(ImageEllipse.from_conic(hole.conic), hole.camera)
@@ -175,7 +175,7 @@ def test_a_circle_fits_two_planes_of_which_one_is_its_own(hole):
         )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(numbers(0.1, 1.0), angles, st.integers(0, 500))
 def test_circles_among_ellipses_tell_their_plane(tilt, azimuth, seed):
     random = np.random.default_rng(seed)

@@ -18,7 +18,7 @@ def seen(distance: float, vanishing: float, nearness: float) -> float:
     return vanishing * distance / (distance + nearness)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(lengths, lengths, numbers(1.0, 1e4), numbers(0.1, 100.0))
 def test_projected_spacings_give_the_vanishing_point_back(a, b, vanishing, nearness):
     y1, y2 = seen(a, vanishing, nearness), seen(a + b, vanishing, nearness)
@@ -27,14 +27,14 @@ def test_projected_spacings_give_the_vanishing_point_back(a, b, vanishing, nearn
     assert vanishing_offset(y1, y2, a, b) == pytest.approx(vanishing, rel=1e-9 + 1e-14 / slant)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(numbers(0.5, 100.0), numbers(0.5, 100.0), numbers(1.0, 1e4), numbers(0.1, 100.0))
 def test_the_vanishing_point_gives_the_ratio_of_lengths_back(a, b, vanishing, nearness):
     y1, y2 = seen(a, vanishing, nearness), seen(a + b, vanishing, nearness)
     assert length_ratio(y1, y2, vanishing) == pytest.approx((a + b) / a, rel=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(numbers(1.0, 500.0), numbers(1.02, 1.98))
 def test_equal_spacings_obey_both_forms_of_the_chapter(y1, growth):
     y2 = growth * y1
@@ -43,7 +43,7 @@ def test_equal_spacings_obey_both_forms_of_the_chapter(y1, growth):
     assert 2.0 / y2 == pytest.approx(1.0 / y1 + 1.0 / y3, rel=1e-12)  # (20.9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(numbers(1.0, 500.0), numbers(1.02, 1.5), lengths, lengths, numbers(0.01, 100.0))
 def test_only_the_ratio_of_the_lengths_counts(y1, growth, a, b, unit):
     assume(abs((a + b) - a * growth) > 1e-3 * (a + b))

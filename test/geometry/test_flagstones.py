@@ -30,7 +30,7 @@ def widths_of(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corners[:, :2, 1].mean(axis=1), np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(numbers(0.05, 1.2), st.lists(st.tuples(numbers(1.0, 8.0), numbers(-3.0, 3.0)), min_size=2, max_size=8))
 def test_widths_of_equal_stones_shrink_to_nothing_at_the_vanishing_line(pitch, middles):
     camera = Camera(500.0, 510.0, 320.0, 240.0, 640, 480, height_m=1.2, pitch=pitch)
@@ -75,7 +75,7 @@ def test_both_ways_agree_on_a_laid_path():
     assert left[0, 1] - vanishing_offset(y1, y2) == pytest.approx(HORIZON_ROW, abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(views(), st.integers(0, 1000), st.integers(1, 8))
 def test_stones_laid_anyhow_give_the_vanishing_line(camera, seed, count):
     fit = fit_stones(garden(camera, count, seed))

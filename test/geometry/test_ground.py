@@ -139,7 +139,7 @@ def test_one_pixel_of_horizon_costs_z_over_h_f():
     assert sigma / distance == pytest.approx(distance / (1.2 * 510.0) * (1.0 + (60.0 / 510.0) ** 2), rel=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(cameras(), numbers(0.0, 1.0), numbers(0.0, 0.01), numbers(0.0, 0.01), numbers(0.0, 0.1))
 def test_covariance_is_what_small_changes_of_pixel_attitude_and_height_do(camera, pixel, roll, pitch, height):
     ground = GroundPlane(camera)
@@ -166,7 +166,7 @@ def test_covariance_is_what_small_changes_of_pixel_attitude_and_height_do(camera
     assert np.abs((measured.covariance - expected) / scale).max(initial=0.0) < 1e-4
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(cameras())
 def test_measuring_above_the_horizon_is_refused_by_number(camera):
     rectified = replace(camera.rectified(), pitch=0.2)
@@ -193,7 +193,7 @@ def test_a_spread_that_is_none_is_refused(arguments, reason):
         GroundPlane(LEVEL).measure([[320.0, 300.0]], **arguments)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(cameras(), st.tuples(*[numbers(-1.0, 1.0)] * 3).filter(lambda n: np.linalg.norm(n) > 0.05))
 def test_every_direction_in_a_plane_vanishes_on_its_line(camera, normal):
     normal = np.array(normal)

@@ -21,14 +21,14 @@ def joints(azimuth: float = 0.3, camera: Camera = CAMERA) -> np.ndarray:
     return GroundPlane(camera).to_pixels((2.0, -0.8) + STONES[:, None] * along)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(rails(most=3))
 def test_two_spacings_of_any_ratio_give_the_direction_of_any_line_before_any_camera(rail):
     direction, _ = fit_spacings(rail.marks, rail.distances).direction(rail.camera)
     assert angle_between(direction, rail.direction) < 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(rails())
 def test_many_spacings_give_the_direction_and_agree(rail):
     fit = fit_spacings(rail.marks, rail.distances)
@@ -37,7 +37,7 @@ def test_many_spacings_give_the_direction_and_agree(rail):
     assert fit.freedom == 2 * len(rail.distances) - 5
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(rails())
 def test_origin_unit_and_order_of_the_distances_do_not_matter(rail):
     one = fit_spacings(rail.marks, rail.distances).direction(rail.camera)[0]

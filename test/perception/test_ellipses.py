@@ -28,7 +28,7 @@ shapes = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(shapes, st.integers(10, 200))
 def test_points_on_an_ellipse_give_it_back(ellipse, count):
     fit = fit_ellipse(ellipse.points(count))
@@ -39,7 +39,7 @@ def test_points_on_an_ellipse_give_it_back(ellipse, count):
     assert np.abs(fit.distances).max() < 1e-6
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(shapes, st.integers(0, 1000))
 def test_points_of_other_edges_do_not_pull_it_away(ellipse, seed):
     random = np.random.default_rng(seed)

@@ -45,7 +45,7 @@ def follow(
     ]
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(
     st.floats(-0.3, 0.3),
     st.floats(-0.2, 0.2),

@@ -45,7 +45,7 @@ def some_picture(seed: int, shape: tuple[int, int] = SHAPE) -> NDArray[np.uint8]
     return np.clip(picture + random.normal(0, 2, shape), 0, 255).astype(np.uint8)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(
     st.sampled_from(METHODS),
     st.floats(-math.pi, math.pi),
@@ -239,7 +239,7 @@ def test_odd_pictures_are_looked_at_all_the_same(detector, picture):
     assert (lines.endpoints <= np.array([width, height] * 2) + 1).all()
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(st.sampled_from(METHODS), st.integers(1, 70), st.integers(1, 90), st.integers(0, 2**32 - 1))
 def test_any_size_of_noise(method, height, width, seed):
     lines = LineDetector(method=method, min_length=4.0).detect(noise((height, width), seed))

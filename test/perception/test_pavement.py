@@ -84,7 +84,7 @@ def elevation(points: VanishingPoints, index: int) -> float:
     off=st.floats(-0.004, 0.004),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_spacings_level_the_vanishing_point_across(roll, pitch, off, seed):
     camera = camera_at(roll, pitch)
     lines, labels = pavement(camera, np.random.default_rng(seed))

@@ -50,7 +50,7 @@ def squared_error(points: VanishingPoints, k: int, direction: NDArray[np.float64
     return float(offset @ np.linalg.solve(points.covariance[k], offset))
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80, derandomize=True)
 @given(seeds, st.integers(1, 3), st.floats(0.0, 0.6))
 def test_directions_are_recovered_in_any_camera_and_any_attitude(seed, many, share):
     random = np.random.default_rng(seed)
@@ -73,7 +73,7 @@ def test_most_of_the_clutter_is_told_from_the_lines():
     assert np.mean(called) < 0.15
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80, derandomize=True)
 @given(seeds, st.integers(1, 3), st.floats(0.0, 0.6))
 def test_what_is_answered_fits_together(seed, many, share):
     random = np.random.default_rng(seed)
@@ -140,7 +140,7 @@ def test_exactly_at_infinity_the_pixel_says_so():
     np.testing.assert_array_equal(points.pixels, [[np.inf, 239.5], [319.5, -np.inf], [-np.inf, np.inf]])
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, derandomize=True)
 @given(seeds, st.floats(0.4, 1.4), st.booleans())
 def test_directions_not_at_right_angles_are_left_so(seed, apart, with_third):
     random = np.random.default_rng(seed)

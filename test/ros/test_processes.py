@@ -123,7 +123,7 @@ VALUES = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(VALUES)
 def test_a_parameter_arrives_as_it_was_given(ros_domain: int, value: object) -> None:
     context = Context()

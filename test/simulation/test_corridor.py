@@ -60,7 +60,7 @@ def test_the_corridor_in_the_house_still_looks_as_it_was_recorded() -> None:
     assert np.abs(seen.astype(float) - recorded).mean() < 2.5  # noise, JPEG
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.sampled_from([-1, 0, 1]), st.floats(1.2, 4.0), st.floats(6.5, 14.0), st.floats(20.0, 40.0))
 def test_the_lane_keeps_half_a_width_from_all_walls(
     turn: int, width: float, after: float, length: float
@@ -168,7 +168,7 @@ def test_a_recording_touches_nothing(shape: CorridorSettings) -> None:
     assert min(rooms) > 0.05
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.sampled_from([-1.0, 1.0]))
 def test_lamps_do_not_shine_through_the_corner_of_the_building(ends: list[float], turn: float) -> None:
     inwards = np.array([(-1.0, 0.0), (0.0, turn)])

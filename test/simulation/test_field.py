@@ -25,7 +25,7 @@ def small(**changes: float | str) -> World:
     return field(FieldSettings(**{**SMALL, **changes}), seed=4)  # type: ignore[arg-type]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(-0.05, 0.05), st.floats(-1.0, 20.0), st.floats(-6.0, 6.0))
 def test_ways_along_the_rows_and_points_of_the_world_tell_the_same(
     c: float, along: float, left: float

@@ -111,7 +111,7 @@ def test_what_leaves_cover_together_is_counted_once() -> None:
     assert covered_area([np.column_stack([np.cos(angles), np.sin(angles)])]) == pytest.approx(np.pi, rel=0.01)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(0.01, 3.0), st.floats(-50, 50), st.floats(-50, 50))
 def test_area_grows_with_the_square_of_the_size_wherever_it_lies(scale: float, x: float, y: float) -> None:
     triangle = np.array([(0.0, 0.0), (1.0, 0.2), (0.3, 0.9)])

@@ -56,7 +56,7 @@ def upright_edge(
     return edge_columns(picture, rows, expected), expected
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(yaw=ANGLES, roll=st.floats(-0.1, 0.1), pitch=st.floats(-0.1, 0.1))
 def test_the_edge_of_a_plane_lies_where_it_projects(yaw: float, roll: float, pitch: float) -> None:
     wall = quad((2.0, 1.0, 0.2), (0.5, -1.0, 0.0), (0, 0, 1.6), WHITE)
@@ -66,7 +66,7 @@ def test_the_edge_of_a_plane_lies_where_it_projects(yaw: float, roll: float, pit
     assert abs((seen - expected).mean()) <= 1 / 32 + 1e-3  # an upright edge meets all rows alike
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(yaw=ANGLES, roll=st.floats(-0.1, 0.1), pitch=st.floats(-0.1, 0.1), depth=st.floats(1.5, 6.0))
 def test_an_edge_painted_on_a_plane_lies_where_it_projects(
     yaw: float, roll: float, pitch: float, depth: float
@@ -85,7 +85,7 @@ def test_an_edge_painted_on_a_plane_lies_where_it_projects(
     assert np.abs(seen - expected).max() < 0.1
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     yaw=st.floats(-0.2, 0.2),
     roll=st.floats(-0.1, 0.1),
@@ -125,7 +125,7 @@ def test_samples_share_no_row_and_no_column(count: int) -> None:
 LEANS = st.floats(-0.1, 0.1, allow_subnormal=False)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(yaw=st.floats(-0.15, 0.15, allow_subnormal=False), roll=LEANS, pitch=LEANS)
 def test_the_corner_of_a_box_lands_on_its_pixel(yaw: float, roll: float, pitch: float) -> None:
     pose = optical_pose(CAMERA, 0.0, 0.0, yaw, roll, pitch)
@@ -144,7 +144,7 @@ def test_the_corner_of_a_box_lands_on_its_pixel(yaw: float, roll: float, pitch: 
     np.testing.assert_allclose((u, c * u + d), corner, atol=0.1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(yaw=ANGLES, roll=st.floats(-0.1, 0.1), place=st.floats(-0.4, 0.4))
 def test_a_box_covers_the_hull_of_its_corners(yaw: float, roll: float, place: float) -> None:
     from scipy.spatial import ConvexHull
@@ -175,7 +175,7 @@ def nearest_quads(
     return found
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31), yaw=ANGLES, pitch=ANGLES)
 def test_the_nearest_surface_is_seen_also_when_it_passes_behind_the_camera(
     seed: int, yaw: float, pitch: float

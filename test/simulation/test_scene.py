@@ -45,7 +45,7 @@ def half(side: int = 64) -> NDArray[np.float32]:
     return alpha
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(yaw=st.floats(-0.2, 0.2), depth=st.floats(0.8, 60.0))
 def test_the_border_of_a_cut_out_lies_where_its_alpha_is_one_half(yaw: float, depth: float) -> None:
     sheet = quad((depth, 0.3, 0.7), (0, -0.6, 0), (0, 0, 0.6), leaf(half(), (0.6, 0.6)))
@@ -84,7 +84,7 @@ def test_only_what_has_two_sides_is_seen_from_behind() -> None:
         np.testing.assert_allclose(seen(board), front, atol=1e-6)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     depth=st.floats(1.0, 5.0),
     side=st.floats(-0.5, 0.5),
@@ -139,7 +139,7 @@ def area_and_centroid(outline: NDArray[np.float64]) -> tuple[float, NDArray[np.f
     return abs(pieces.sum()) / 2, ((outline + after) * pieces[:, None]).sum(axis=0) / (3 * pieces.sum())
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     yaw=st.floats(-0.1, 0.1),
     roll=st.floats(-0.5, 0.5),
@@ -188,7 +188,7 @@ def test_nonsense_shapes_are_refused() -> None:
         quad((0, 0, 0), (1, 0, 0), (0, 1, 0), leaf(half(4), (1, 1)), holes=(Ellipse((0.5, 0.5), (0.1, 0.1)),))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), depth=st.floats(0.3, 6.0), slant=st.floats(-1.3, 1.3), repeat=st.booleans())
 def test_pixels_taken_whole_are_those_whose_samples_agree(
     seed: int, depth: float, slant: float, repeat: bool

@@ -52,7 +52,7 @@ def half_lit(
     return np.asarray(reach[last_dark])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(azimuth=AZIMUTHS, elevation=st.floats(0.6, 1.3), height=st.floats(0.5, 1.0))
 def test_the_shadow_of_a_box_is_the_hull_of_its_projected_corners(
     azimuth: float, elevation: float, height: float
@@ -76,7 +76,7 @@ def test_the_shadow_of_a_box_is_the_hull_of_its_projected_corners(
         assert np.abs(off).max() < 0.02
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     azimuth=AZIMUTHS, elevation=st.floats(0.6, 1.2), radius=st.floats(0.1, 0.3)
 )  # its tip is on the ground
