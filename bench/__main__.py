@@ -21,10 +21,22 @@ BENCHMARKS = {
     "folds": "the same with settings chosen on other pictures",
     "kitti": "the way ahead on a real road, through the real nodes",
     "corridor": "heading, offset and attitude in the recorded corridor, through the real nodes",
+    "calibration": "focal length, mounting and height from a drive; what flagstones add",
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
+    "centres": "true centres of holes on rendered plates",
+    "crbd": "crop rows of single real pictures, beside the textbook's recipe",
+    "field": "crop rows of recorded drives through three simulated crops",
+    "field_loop": "crop rows driven along at 1.6 m/s, to the headland and through a gap",
+    "attitude": "roll and pitch of a body that leans by up to 3 degrees",
+    "road": "heading and curvature on a winding road, 500 m of bends driven ten times",
+    "plan_view": "plan and map of the floor: simulated drives, a real road, cost",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "costs": "cost against the number of lines and of pixels",
     "latency": "from picture to steering at 30 Hz, processes over DDS",
+    "paths": "ways planned on the maps of MovingAI",
+    "fields": "speed, memory and growth of the distance function",
+    "mazes": "contest mazes explored, beside flood fill",
+    "maze_drives": "contest mazes driven by their true plan",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",
 }
 OUTPUT = ROOT / "out" / "bench.json"
@@ -57,7 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
-    about = "\n".join(f"  {name:<10}{text}" for name, text in BENCHMARKS.items())
+    about = "\n".join(f"  {name:<12}{text}" for name, text in BENCHMARKS.items())
     parser = argparse.ArgumentParser(
         "python -m bench",
         description="Measure accuracy and latency, beside the marks to reach.",

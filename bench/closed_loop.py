@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.replay import LINES, STEERING, VANISHING
+from bench.replay import LINES, MAPPER, STEERING, VANISHING
 from bench.report import Cell, Row, Table, at_least, at_most
 from robot_vision.ros.processes import Graph, ProcessError
 from robot_vision.ros.replays import START_S, wait_for_end
@@ -33,11 +33,18 @@ def run(quick: bool) -> list[Table]:
     return [_table([drive(seed) for seed in (QUICK_SEEDS if quick else SEEDS)])]
 
 
-def drive(seed: int, **settings: Any) -> dict[str, Any]:
+def drive(
+    seed: int,
+    parameters: dict[str, dict[str, Any]] | None = None,
+    mapped: bool = False,
+    **settings: Any,
+) -> dict[str, Any]:
     """Let the real nodes drive 30 m of corridor in lockstep, from 0.4 m and 10 degrees off.
 
     Args:
         seed: of the corridor, of noise and leaning.
+        parameters: of the nodes, by node; None: those for the corridor.
+        mapped: whether the floor is mapped, so that something looks at what is ahead.
         settings: further parameters of the simulator.
 
     Returns:
@@ -48,11 +55,13 @@ def drive(seed: int, **settings: Any) -> dict[str, Any]:
         ProcessError: a node failed.
     """
     camera = standard_camera()
-    parameters: dict[str, dict[str, Any]] = {
+    parameters = parameters or {
         LINES: {},
         VANISHING: {"camera.height": camera.height_m, "camera.pitch": camera.pitch},
         STEERING: {"speed": SPEED},
     }
+    if mapped:
+        parameters[MAPPER] = {**parameters[VANISHING], "robot.width": ROBOT_M}
     simulated = {
         "world": "corridor",
         "seed": seed,

@@ -74,7 +74,7 @@ def run(quick: bool) -> list[Table]:
 
 def score_attitude(bag: Path) -> AttitudeScore:
     """Compare the `attitude` in a bag with its `truth/attitude` by stamp."""
-    answers, truths = _attitudes(bag, "attitude"), _attitudes(bag, "truth/attitude")
+    answers, truths = attitudes(bag, "attitude"), attitudes(bag, "truth/attitude")
     both = sorted(answers.keys() & truths.keys())
     if not both:
         return AttitudeScore(0, math.nan, math.nan, math.nan)
@@ -85,7 +85,7 @@ def score_attitude(bag: Path) -> AttitudeScore:
     return AttitudeScore(len(both), roll, pitch, float(normalised.mean()))
 
 
-def _attitudes(bag: Path, topic: str) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def attitudes(bag: Path, topic: str) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return (roll, pitch) in rad and their covariance (2, 2) by stamp."""
     found = {}
     for cdr in said(bag, topic):

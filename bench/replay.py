@@ -8,6 +8,7 @@ from pathlib import Path
 from robot_vision.bags import BagReader
 
 LINES, VANISHING, STEERING = "line_detector", "vp_estimator", "corridor_steering"
+MAPPER = "plan_view_mapper"
 #: Pictures are in the bag replayed already.
 PICTURES = ("lines/overlay", "image", "image/compressed")
 

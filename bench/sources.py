@@ -84,6 +84,35 @@ def york_urban() -> tuple[Camera, list[YorkPicture]]:
     return Camera(**truth["camera"]), pictures
 
 
+@dataclass(frozen=True)
+class CropPicture:
+    """A picture of the Crop Row Benchmark Dataset.
+
+    Attributes:
+        path: of its file.
+        rows: (N, 2) for the last N image rows: column of the middle crop row, px from the middle of the picture, and
+            distance of the rows, px.
+    """
+
+    path: Path
+    rows: NDArray[np.float64]
+
+    def colour(self) -> NDArray[np.uint8]:
+        """Read it, uint8 (H, W, 3) BGR."""
+        return read_picture(self.path, cv2.IMREAD_COLOR)
+
+
+def crop_rows() -> list[CropPicture]:
+    """Return the pictures of crop rows, in order of name.
+
+    Raises:
+        MissingSetError: they are not there.
+    """
+    folder = data_set("crbd", "ground_truth")
+    truths = sorted((folder / "ground_truth").glob("*.crp"))
+    return [CropPicture(folder / "images" / f"{path.stem}.jpg", np.loadtxt(path)) for path in truths]
+
+
 def kitti_straight() -> Path:
     """Return the folder of the straight road of KITTI: `image_l`, `calib.txt`, `poses.txt`.
 

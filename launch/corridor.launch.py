@@ -48,6 +48,7 @@ def generate_launch_description() -> LaunchDescription:
         "camera.height": ParameterValue(given["camera_height"], value_type=float),
         "camera.pitch": ParameterValue(given["camera_pitch"], value_type=float),
     }
+    upright = {"mind_lean": True, "camera.pitch": place["camera.pitch"]}
     bag = {
         "bag": ParameterValue(given["bag"], value_type=str),
         "rate": ParameterValue(given["rate"], value_type=float),
@@ -69,7 +70,7 @@ def generate_launch_description() -> LaunchDescription:
             ),
             node("line_detector", {"transport": given["transport"]}, replay_time),
             node("vp_estimator", place, replay_time),
-            node("corridor_steering", replay_time),
+            node("corridor_steering", upright, replay_time),
             player,
             RegisterEventHandler(end),
         ]

@@ -56,6 +56,7 @@ def generate_launch_description() -> LaunchDescription:
 
     simulated_time = {"use_sim_time": True}
     place = {"camera.height": given_as("camera_height"), "camera.pitch": given_as("camera_pitch")}
+    upright = {"mind_lean": True, "camera.pitch": place["camera.pitch"]}
     simulator = node(
         "simulator",
         {
@@ -88,7 +89,7 @@ def generate_launch_description() -> LaunchDescription:
             ),
             node("line_detector", simulated_time),
             node("vp_estimator", place, simulated_time),
-            node("corridor_steering", {"speed": given_as("speed")}, simulated_time),
+            node("corridor_steering", {"speed": given_as("speed")}, upright, simulated_time),
             simulator,
             RegisterEventHandler(end),
         ]

@@ -191,6 +191,8 @@ def warm_steps() -> list[tuple[str, Callable[[], None]]]:
     return [
         ("lines", _find_lines),
         ("vanishing points", _find_vanishing_points),
+        ("planning", _plan),
+        ("crop rows", _find_crop_rows),
     ]
 
 
@@ -200,7 +202,19 @@ def _find_lines() -> None:
     LineDetector().warm_up()
 
 
+def _find_crop_rows() -> None:
+    from robot_vision.perception import CropRowDetector
+
+    CropRowDetector().warm_up()
+
+
 def _find_vanishing_points() -> None:
     from robot_vision.perception import VanishingPointEstimator
 
     VanishingPointEstimator().warm_up()
+
+
+def _plan() -> None:
+    from robot_vision.planning.path import warm_up
+
+    warm_up()

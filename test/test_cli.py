@@ -19,7 +19,18 @@ from robot_vision.bags import BagReader, BagWriter, messages, score_heading
 from robot_vision.ros.domains import FreeDomain
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = {"demo", "run", "play", "record", "make-bag", "simulate", "bench", "doctor"}
+COMMANDS = {
+    "demo",
+    "run",
+    "play",
+    "record",
+    "make-bag",
+    "simulate",
+    "calibrate",
+    "centres",
+    "bench",
+    "doctor",
+}
 
 
 def robot_vision(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -87,12 +98,36 @@ def test_make_bag_makes_a_bag_that_can_be_read(tmp_path: Path) -> None:
         (("simulate", "--set", "colour=3", "-o", "x.mcap"), "'colour'"),
         (("demo", "--bag", "no/such.mcap"), "no/such.mcap"),
         (("demo", "--live", "moon"), "there is no world 'moon'"),
+        (("demo", "--height", "nan"), "the camera must be 0 m or more"),
+        (("demo", "--pitch", "120"), "-90 to 90 degrees, not 120"),
         (("simulate", "-o", "no/such/folder/x.png"), "no/such/folder/x.png"),
         (("play", "no/such.mcap"), "no/such.mcap"),
+        (("centres", "no/such.png"), "no/such.png"),
+        (("centres", "setup.cfg", "--line", "0,0,1"), "no picture"),
+        (("centres", "docs/worlds/plate.png", "--calibration", "460,460,319.5"), "calibration"),
+        (("centres", "docs/worlds/plate.png", "--normal", "0,0"), "normal must be three numbers"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(arguments: tuple[str, ...], words: str) -> None:
     assert words in refused(*arguments)
+
+
+def test_centres_of_a_plate_are_told_and_drawn(tmp_path: Path) -> None:
+    plate, drawing = tmp_path / "plate.png", tmp_path / "centres.png"
+    assert robot_vision("simulate", "plate", "--seconds", "2", "-o", plate).returncode == 0
+    run = robot_vision("centres", plate, "--calibration", "460,460,319.5,239.5", "-o", drawing)
+    assert run.returncode == 0, run.stderr
+    plane, head, *rows, last = run.stdout.splitlines()
+    assert "circles tell it" in plane and "shift" in head and last == f"{drawing}: 12 centres"
+    assert len(rows) == 12
+    assert max(float(row.split()[4]) for row in rows) > 0.5
+    picture = cv2.imread(str(drawing))
+    assert picture is not None and picture.shape == (960, 1280, 3)
+    assert "nothing tells how the plane lies" in refused("centres", plate)
+    run = robot_vision("centres", plate, "--line", "0,1,-240")
+    assert run.returncode == 0, run.stderr
+    assert "left out: the ellipse at" in run.stdout
+    assert "'.xyz'" in refused("centres", plate, "--line", "0,0,1", "-o", tmp_path / "a.xyz")
 
 
 def test_the_demonstration_leaves_report_picture_film_and_bag(tmp_path: Path) -> None:
@@ -110,6 +145,14 @@ def test_the_demonstration_leaves_report_picture_film_and_bag(tmp_path: Path) ->
     film = cv2.VideoCapture(str(out / "demo.mp4"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == count
     assert film.read()[0]
+
+
+def test_the_answers_never_take_the_place_of_the_bag(tmp_path: Path) -> None:
+    bag = tmp_path / "demo.mcap"
+    simulation.record("corridor", bag, seconds=0.5)
+    before = bag.read_bytes()
+    assert "write the answers elsewhere" in refused("demo", "--bag", bag, "--out", tmp_path)
+    assert bag.read_bytes() == before
 
 
 def test_a_bag_without_pictures_is_no_demonstration(tmp_path: Path) -> None:

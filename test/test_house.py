@@ -32,6 +32,7 @@ ROOMS = (
     "cli",
 )
 FRONT_DOOR = {
+    "calibrate": "cli",
     "demo": "cli",
     "doctor": "cli",
     "places": "cli",

@@ -19,6 +19,8 @@ CLASSES = {
     "line_detector": "LineDetectorNode",
     "vp_estimator": "VpEstimatorNode",
     "corridor_steering": "CorridorSteeringNode",
+    "maze_planner": "MazePlannerNode",
+    "crop_row_steering": "CropRowSteeringNode",
     "bag_player": "BagPlayer",
     "bag_recorder": "BagRecorder",
     "simulator": "Simulator",

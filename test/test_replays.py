@@ -14,8 +14,9 @@ from robot_vision.ros.replays import replay
 
 ROOT = Path(__file__).resolve().parents[1]
 CORRIDOR = ROOT / "bags" / "corridor.mcap"
+FIELD = ROOT / "bags" / "field.mcap"
 DATA = Path(os.environ.get("ROBOT_VISION_DATA", ROOT.parent / "shared" / "data"))
-PICTURES = ("lines/overlay", "image", "image/compressed")
+PICTURES = ("lines/overlay", "rows/overlay", "image", "image/compressed")
 CHAIN = ("line_detector", "vp_estimator", "corridor_steering")
 
 
@@ -39,6 +40,19 @@ def test_the_corridor_is_steered_well_and_the_same_way_twice(tmp_path: Path) -> 
     assert score.yaw_rms_deg <= 0.3
     assert score.offset.rms <= 0.05
     assert 0.2 < score.yaw.normalised < 3.0
+    assert 0.1 < score.offset.normalised < 3.0
+
+
+def test_the_field_is_followed_within_a_centimetre(tmp_path: Path) -> None:
+    place = {"transport": "compressed", "camera.height": 1.4, "camera.pitch": 0.6109, "row.spacing": 0.5}
+    answers = tmp_path / "rows.mcap"
+    replay(FIELD, answers, ["crop_row_steering"], "steering", {"crop_row_steering": place}, exclude=PICTURES)
+    assert len(said(answers, "steering")) == 100
+    score = score_heading(answers)
+    assert score.missing <= 5
+    assert score.yaw_rms_deg <= 0.5
+    assert score.offset.rms <= 0.010
+    assert 0.1 < score.yaw.normalised < 3.0
     assert 0.1 < score.offset.normalised < 3.0
 
 

@@ -100,8 +100,8 @@ def _from_yaml(path: Path, text: str) -> Camera:
         found: Any = YAML(typ="safe").load(text)
         matrix = _matrix(found, "camera_matrix", 9)
         info = SimpleNamespace(
-            width=int(found["image_width"]),
-            height=int(found["image_height"]),
+            width=_size(found, "image_width"),
+            height=_size(found, "image_height"),
             distortion_model=str(found.get("distortion_model", "plumb_bob")),
             k=matrix,
             d=_matrix(found, "distortion_coefficients", None) if "distortion_coefficients" in found else [],
@@ -121,8 +121,19 @@ def _from_yaml(path: Path, text: str) -> Camera:
     return Camera.from_camera_info(info)
 
 
+def _size(found: Any, key: str) -> int:
+    if not isinstance(found[key], int):
+        raise ValueError(f"{key} must be a whole number of pixels, not {found[key]!r}")
+    return int(found[key])
+
+
 def _matrix(found: Any, key: str, count: int | None) -> list[float]:
-    data = [float(number) for number in found[key]["data"]]
+    try:
+        data = [float(number) for number in found[key]["data"]]
+    except (TypeError, ValueError, KeyError) as error:
+        if key not in found:
+            raise
+        raise ValueError(f"{key} must hold its numbers under data, not {found[key]!r}") from error
     if count is not None and len(data) != count:
         raise ValueError(f"{key} has {len(data)} numbers, not {count}")
     return data

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ Progress = Callable[[int, int | None], None]
 OPTICAL_FRAME = "camera_optical_frame"
 DEFAULT_RATE_HZ = 10.0
 START_NS = 1_000_000_000  # a stamp of 0 means "no time" to ROS
+_PREFIX = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*/?", re.ASCII)
 _LOG = logging.getLogger(__name__)
 
 
@@ -72,7 +74,8 @@ def make_bag(
         rate_hz: pictures a second; None: that of the video, or 10 for files.
         transport: `raw`, `compressed` (JPEG; JPEG files go in as they are) or `png` (lossless).
         quality: of JPEG, 1 to 100.
-        prefix: put before the topic names, such as `front` for `/front/image`.
+        prefix: put before the topic names, such as `front` for `/front/image`; ROS takes letters, digits and `_`,
+            and no digit at the beginning of a part.
         compression: of the bag's chunks.
         start_ns: stamp of the first picture.
         progress: called with pictures done and pictures in all (None: not known).
@@ -89,6 +92,7 @@ def make_bag(
     rate = rate_hz if rate_hz is not None else pictures.rate_hz or DEFAULT_RATE_HZ
     if not (np.isfinite(rate) and 0 < rate <= 1000):
         raise BagError(f"a rate of {rate} pictures a second makes no bag (0 to 1000 Hz)")
+    _check_prefix(prefix)
     way = read_poses(poses) if isinstance(poses, str | os.PathLike) else poses
     warnings: list[str] = []
     _check_pose_count(way, pictures, warnings)
@@ -105,6 +109,12 @@ def make_bag(
             raise BagError(f"none of the pictures could be read; the first trouble was: {warnings[0]}")
     seconds = (job.last_ns - start_ns) / 1e9
     return MadeBag(bag.path, job.count, *job.size, seconds, tuple(warnings))
+
+
+def _check_prefix(prefix: str) -> None:
+    if prefix.strip("/") and not _PREFIX.fullmatch(prefix):
+        rule = "letters, digits and _, no digit first, with single / between the parts"
+        raise BagError(f"{prefix!r} cannot stand before a topic: ROS takes {rule}")
 
 
 def _check_pose_count(way: NDArray[np.float64] | None, pictures: PictureSource, warnings: list[str]) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable
 
+from robot_vision.bags.errors import BagError
 from robot_vision.bags.read_ahead import ReadAhead
 from robot_vision.bags.replay import Replay, ReplayItem
 
@@ -45,6 +46,9 @@ class Playback:
         """Replay to the end; returns False if `stop` came first.
 
         In lockstep the end (and the next lap) waits for the answer to the last picture, too.
+
+        Raises:
+            BagError: there is nothing to replay, or the bag cannot be read on.
         """
         while True:
             if not self._run_lap():
@@ -105,8 +109,9 @@ class Playback:
                 self._send(item)
                 self.sent += 1
                 self.pictures += item.is_picture
-        # a bag without a single message must not loop without a pause
-        return self._wait_for_answer() and (begun or not self._loop)
+        if not begun:
+            raise BagError("no message lies in the part that is to be replayed")
+        return self._wait_for_answer()
 
     def _wait(self, item: ReplayItem) -> bool:
         with self._changed:

@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-from robot_vision.bags.errors import BagError
 from robot_vision.bags.qos import OfferedQoS
 from robot_vision.bags.writer import BagWriter
 
@@ -104,19 +103,14 @@ class Recording:
         except Exception as error:  # whatever ends the writing must be known to who goes on recording
             with self._changed:
                 self.trouble = str(error) or type(error).__name__
-                self.dropped += self._waiting()
                 self._entries.clear()
+                self.dropped = self.received - self._bag.saved_count
 
     def _write_one(self, entry: _Entry) -> None:
         if entry.cdr is None:
             self._bag.add_topic(entry.topic, entry.type_name, entry.qos)
             return
-        try:
-            self._bag.write(entry.topic, entry.type_name, entry.stamp_ns, entry.cdr)
-        except BagError:
-            with self._changed:
-                self.dropped += 1
-            raise
+        self._bag.write(entry.topic, entry.type_name, entry.stamp_ns, entry.cdr)
         with self._changed:
             self._bytes -= len(entry.cdr)
 
@@ -127,6 +121,3 @@ class Recording:
             if self._entries:
                 return self._entries.popleft()
             return _END if self._closing else None
-
-    def _waiting(self) -> int:
-        return sum(1 for entry in self._entries if entry.cdr is not None)

@@ -51,7 +51,8 @@ class BagWriter:
 
     The bag grows as `NAME.partial` and takes its name when it is finished: nobody ever finds half a bag
     under the final name. With `in_place` (a recorder: what was recorded counts, even if the end is missing)
-    it grows under its final name, which must not exist yet, and `BagReader` reads it to its last whole chunk.
+    it grows under its final name, which must not exist yet unless it may `overwrite`, and `BagReader` reads it to
+    its last whole chunk. Only a file is ever replaced; a link stays, and what it points to is written.
 
     The same calls give the same bytes. Chunks carry CRCs.
 
@@ -59,10 +60,15 @@ class BagWriter:
         path: the file to write, usually `*.mcap`; its folder must exist.
         compression: of the chunks. Compressed pictures gain nothing from it.
         chunk_size: bytes of messages gathered before they are written.
-        in_place: see above.
+        in_place, overwrite: see above.
+
+    Attributes:
+        message_count: messages taken.
+        saved_count: messages in chunks that are with the system: what `BagReader` finds after a kill.
 
     Raises:
-        BagError: the file cannot be written (folder missing, no permission, disk full, exists already).
+        BagError: the file cannot be written (folder missing, no permission, disk full, exists already, is a
+            folder or a device).
     """
 
     def __init__(
@@ -72,6 +78,7 @@ class BagWriter:
         chunk_size: int = CHUNK_SIZE,
         *,
         in_place: bool = False,
+        overwrite: bool = False,
     ) -> None:
         from mcap.writer import CompressionType, Writer
 
@@ -81,7 +88,9 @@ class BagWriter:
             raise BagError(f"chunk_size must be at least 1 byte, not {chunk_size}")
         self.path = Path(path)
         self.message_count = 0
-        self._growing = self.path if in_place else self.path.with_name(self.path.name + PARTIAL_SUFFIX)
+        self.saved_count = 0
+        self._final = Path(os.path.realpath(self.path))
+        self._growing = self._final if in_place else self._final.with_name(self._final.name + PARTIAL_SUFFIX)
         self._in_place = in_place
         self._channels: dict[str, tuple[int, str]] = {}
         self._schemas: dict[str, int] = {}
@@ -89,8 +98,10 @@ class BagWriter:
         self._open = False
         if self.path.is_dir():
             raise BagError(f"{self.path} is a folder: give the bag a file name, such as {self.path}/bag.mcap")
+        if self._final.exists() and not self._final.is_file():
+            raise BagError(f"{self.path} is not a file but a device or a pipe; a bag would take its place")
         try:
-            self._file = _File(self._growing, exclusive=in_place)
+            self._file = _File(self._growing, exclusive=in_place and not overwrite)
         except FileExistsError as error:
             raise BagError(f"{self.path} exists already; a recording does not overwrite another") from error
         except OSError as error:
@@ -155,12 +166,15 @@ class BagWriter:
             raise BagError(f"{topic}: a stamp of {stamp_ns} ns cannot stand in a bag")
         self.add_topic(topic, type_name)
         sequence = self._counts[topic]
+        size = self._file.tell()
         try:
             self._mcap.add_message(self._channels[topic][0], stamp_ns, data, stamp_ns, sequence)
         except OSError as error:
             self._fail(error)
         self._counts[topic] = sequence + 1
         self.message_count += 1
+        if self._file.tell() > size:  # the chunk was full, and this message its last
+            self.saved_count = self.message_count
 
     def flush(self) -> None:
         """Close the current chunk now, so that everything written so far survives a kill."""
@@ -169,6 +183,7 @@ class BagWriter:
             self._mcap.flush()  # type: ignore[no-untyped-call]
         except OSError as error:
             self._fail(error)
+        self.saved_count = self.message_count
 
     def finish(self) -> None:
         """Write the index and give the bag its name; does nothing the second time."""
@@ -178,10 +193,11 @@ class BagWriter:
             self._mcap.finish()  # type: ignore[no-untyped-call]
             self._file.close()
             if not self._in_place:
-                os.replace(self._growing, self.path)
+                os.replace(self._growing, self._final)
         except OSError as error:
             self._fail(error)
         self._open = False
+        self.saved_count = self.message_count
 
     def abort(self) -> None:
         """Give up: the unfinished file goes away (with `in_place` it stays, as far as it got)."""

@@ -3,5 +3,6 @@
 
 from robot_vision.control.corridor import CorridorSteering
 from robot_vision.control.limits import Steering
+from robot_vision.control.pursuit import PathPursuit
 
-__all__ = ["CorridorSteering", "Steering"]
+__all__ = ["CorridorSteering", "PathPursuit", "Steering"]

@@ -35,6 +35,7 @@ def run_graph(
     settings: dict[str, dict[str, Any]] = {name: {} for name in NODES}
     settings["line_detector"] = {"transport": transport}
     settings["vp_estimator"] = {"camera.height": height_m, "camera.pitch": pitch}
+    settings["corridor_steering"] = {"mind_lean": True, "camera.pitch": pitch}
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())

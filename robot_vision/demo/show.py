@@ -27,12 +27,24 @@ ANSWER_S = 2.0  # how long the replay waits for an answer to one picture
 TOLD = 1e-6  # variance of a heading that is the truth, rad² and m²
 
 
+class MountError(ValueError):
+    """A place where no camera can sit."""
+
+
 @dataclass(frozen=True)
 class Mount:
     """Where the camera sits: height over the ground (m), pitch (rad, down is positive)."""
 
     height: float
     pitch: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.height) and self.height >= 0.0):
+            raise MountError(f"the camera must be 0 m or more over the ground, not {self.height}")
+        if not abs(self.pitch) <= 0.5 * math.pi:
+            raise MountError(
+                f"the camera must look down by -90 to 90 degrees, not {math.degrees(self.pitch):g}"
+            )
 
 
 def run_demo(bag: Path, out: Path, mount: Mount, console: Console) -> None:

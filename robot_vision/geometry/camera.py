@@ -14,6 +14,8 @@ from robot_vision.geometry import camera_info as ros
 from robot_vision.geometry.arrays import FloatArray, as_rows
 from robot_vision.geometry.camera_checks import (
     check_principal_point,
+    checked_angle,
+    checked_focal_length,
     checked_number,
     checked_projection,
     checked_rotation,
@@ -72,11 +74,12 @@ class Camera:
         """Check every field and bring it to plain floats and tuples, so that cameras compare and hash."""
         for name in ("width", "height"):
             self._set(name, checked_size(name, getattr(self, name)))
-        for name in ("fx", "fy", "cx", "cy", "pitch", "roll", "x_m"):
-            self._set(name, checked_number(name, getattr(self, name)))
         for name in ("fx", "fy"):
-            if getattr(self, name) <= 0.0:
-                raise CameraError(name, f"focal length must be positive, got {getattr(self, name):g} px")
+            self._set(name, checked_focal_length(name, getattr(self, name)))
+        for name in ("cx", "cy", "x_m"):
+            self._set(name, checked_number(name, getattr(self, name)))
+        for name in ("pitch", "roll"):
+            self._set(name, checked_angle(name, getattr(self, name)))
         check_principal_point("cx", self.cx, self.fx, "width", self.width)
         check_principal_point("cy", self.cy, self.fy, "height", self.height)
         if self.height_m is not None:

@@ -53,7 +53,7 @@ def read(info: Any) -> RawCameraInfo:
         )
     check_no_skew("k", k)
     model = str(info.distortion_model)
-    distortion = tuple(float(value) for value in info.d)
+    distortion = () if info.d is None else tuple(info.d)
     if not model and not any(distortion):
         model, distortion = "plumb_bob", ()
     width, height = int(info.width), int(info.height)

@@ -244,7 +244,10 @@ def checked_coefficients(model: str, coefficients: Sequence[float]) -> tuple[flo
     if model not in COEFFICIENT_COUNTS:
         known = ", ".join(COEFFICIENT_COUNTS)
         raise CameraError("distortion_model", f"{model!r} is not known; known are {known}")
-    values = tuple(float(value) for value in coefficients)
+    try:
+        values = tuple(float(value) for value in coefficients)
+    except (TypeError, ValueError, OverflowError):
+        raise CameraError("distortion", f"must be a sequence of numbers, got {coefficients!r}") from None
     if not all(math.isfinite(value) for value in values):
         raise CameraError("distortion", f"coefficients must be finite numbers, got {values}")
     counts = COEFFICIENT_COUNTS[model]

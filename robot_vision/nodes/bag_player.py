@@ -22,7 +22,6 @@ from functools import partial
 from importlib import import_module
 from typing import Any, ClassVar
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -33,11 +32,10 @@ from robot_vision.bags import BagError, BagReader, encode, messages
 from robot_vision.bags.playback import Playback
 from robot_vision.bags.replay import PICTURE_TYPES, Lockstep, Replay, ReplayItem, replay_items
 from robot_vision.bags.schema import has_header
-from robot_vision.ros.diagnostics import TOPIC as DIAGNOSTICS
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.node import VisionNode
 from robot_vision.ros.parameters import Setting
-from robot_vision.ros.qos import EVERY
+from robot_vision.ros.readiness import AwaitedNodes
 from robot_vision.ros.run import run_node
 
 PICTURE_DEPTH = 5
@@ -96,10 +94,12 @@ class BagPlayer(VisionNode):
         if not settings["bag"]:
             raise BagError("the parameter bag must name the bag to replay")
         self._bag = BagReader(settings["bag"])
-        for warning in self._bag.warnings:
-            self.diagnostics.report(Level.WARN, warning)
+        if settings["start"] > self._bag.duration_s:
+            raise BagError(
+                f"start lies at {settings['start']:g} s, but {self._bag.path} ends at {self._bag.duration_s:.1f} s"
+            )
         self._restamp = settings["restamp"]
-        self._awaited_nodes = _names(settings["wait_for_nodes"])
+        self._awaited_nodes = AwaitedNodes(self, settings["wait_for_nodes"])
         self._outputs = self._advertise(_names(settings["topics"]), _names(settings["exclude"]))
         self._pictures = [name for name in self._outputs if self._bag.topics[name].type_name in PICTURE_TYPES]
         with_clock = settings["publish_clock"] and not self._restamp
@@ -115,11 +115,8 @@ class BagPlayer(VisionNode):
         self._thread = threading.Thread(target=self._play, name="playback", daemon=True)
         self._begun = False
         self._deadline = time.monotonic() + settings["wait_timeout"]
-        self._ready_nodes: set[str] = set()
         self._known: dict[str, int] = {}
         self._settled = 0
-        if self._awaited_nodes:
-            self.hear(DiagnosticArray, DIAGNOSTICS, self._hear_diagnostics, EVERY)
         for name in ("pause", "resume", "step"):
             self.create_service(Trigger, f"~/{name}", partial(self._obey, name))
         self._look_timer = self.create_timer(POLL_S, self._look, clock=self.steady_clock)
@@ -137,12 +134,17 @@ class BagPlayer(VisionNode):
     def _advertise(self, only: frozenset[str], exclude: frozenset[str]) -> dict[str, Publisher]:
         """Create a publisher for each topic that is to be replayed and whose type is installed."""
         publishers = {}
+        answers = frozenset(self._lockstep_topics())
         held = {name.lstrip("/") for name in self._bag.topics}
         for name in sorted(only - held):
             self.get_logger().warning(f"{self._bag.path} holds no topic {name}")
         for name, info in self._bag.topics.items():
             plain = name.lstrip("/")
             if plain in NOT_PLAYED | exclude or (only and plain not in only):
+                continue
+            if self.resolve_topic_name(plain) in answers:
+                # an answer from the bag would let the next picture go before anybody has looked at this one
+                self.get_logger().warning(f"{name} is left out: lockstep waits for others to say it")
                 continue
             kind = message_type(info.type_name)
             if kind is None:
@@ -166,9 +168,7 @@ class BagPlayer(VisionNode):
 
     def _make_playback(self) -> Playback:
         settings = self.settings
-        topics = [
-            self.resolve_topic_name(name.strip()) for name in settings["lockstep"].split(",") if name.strip()
-        ]
+        topics = self._lockstep_topics()
         if topics and self._restamp:
             raise BagError("restamp and lockstep exclude each other: lockstep compares the stamps of the bag")
         if topics:
@@ -179,23 +179,19 @@ class BagPlayer(VisionNode):
         )
         return Playback(replay, self._lap, self._send, loop=settings["loop"])
 
+    def _lockstep_topics(self) -> list[str]:
+        names = self.settings["lockstep"].split(",")
+        return [self.resolved("lockstep", name.strip()) for name in names if name.strip()]
+
     def _lap(self) -> Iterator[ReplayItem]:
         start = self._bag.start_ns + round(self.settings["start"] * 1e9)
         duration = round(self.settings["duration"] * 1e9)
         end = start + duration if duration else None
         return replay_items(self._bag.messages(self._outputs, start, end), frozenset(self._pictures))
 
-    def _hear_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            if ready_node(status) in self._awaited_nodes:
-                self._ready_nodes.add(ready_node(status))
-
     def _missing(self) -> list[str]:
         """Return what must still happen before the first message may go out, in plain words."""
-        missing = [
-            f"{name} has not said that it is ready"
-            for name in sorted(self._awaited_nodes - self._ready_nodes)
-        ]
+        missing = self._awaited_nodes.missing()
         counts = {name: publisher.get_subscription_count() for name, publisher in self._outputs.items()}
         for name, publisher in self._outputs.items():
             if counts[name] < self.count_subscribers(publisher.topic_name):
@@ -251,9 +247,25 @@ class BagPlayer(VisionNode):
             self.get_logger().warning(f"{waited}: {'; '.join(missing)}")
         extent = f"{self._bag.duration_s:.1f} s, {self._bag.message_count} messages"
         self.get_logger().info(f"replaying {self._bag.path}: {extent}")
-        self.diagnostics.report(Level.OK, f"replays {self._bag.path}")
+        self._warn_of_rivals()
+        if self._bag.warnings:
+            self.diagnostics.report(Level.WARN, f"replays what can be read: {'; '.join(self._bag.warnings)}")
+        else:
+            self.diagnostics.report(Level.OK, f"replays {self._bag.path}")
         self._begun = True
         self._thread.start()
+
+    def _warn_of_rivals(self) -> None:
+        """Say which topics of the bag others publish too: who hears them cannot tell old from new."""
+        rivals = [
+            name
+            for name, publisher in self._outputs.items()
+            if self.count_publishers(publisher.topic_name) > 1
+        ]
+        if rivals:
+            self.get_logger().warning(
+                f"others publish {', '.join(rivals)} too: leave them out with exclude, or stop the others"
+            )
 
     def _play(self) -> None:
         try:
@@ -314,12 +326,6 @@ class BagPlayer(VisionNode):
         refusals = {"pause": "it is held already", "resume": "it is not held", "step": "pause it first"}
         response.message = "" if response.success else refusals[name]
         return response
-
-
-def ready_node(status: DiagnosticStatus) -> str:
-    """Return the name of the node that says with this diagnostic status that it is ready, or ""."""
-    ready = any(item.key == "ready" and item.value == "true" for item in status.values)
-    return status.name.lstrip("/") if ready else ""
 
 
 def _names(values: list[str]) -> frozenset[str]:

@@ -62,14 +62,13 @@ class BagRecorder(VisionNode):
         super().__init__("bag_recorder")
         settings = self.settings
         output = Path(settings["output"])
-        self._only = self._resolved(settings["topics"])
-        self._exclude = self._resolved(settings["exclude"])
+        self._only = self._topics("topics")
+        self._exclude = self._topics("exclude")
         os.nice(settings["nice"])
         if not output.name:
             raise BagError("the parameter output must name the bag to write")
-        if settings["overwrite"]:
-            output.unlink(missing_ok=True)
-        self._recording = Recording(BagWriter(output, settings["compression"], in_place=True))
+        bag = BagWriter(output, settings["compression"], in_place=True, overwrite=settings["overwrite"])
+        self._recording = Recording(bag)
         self._output = output
         self._heard: dict[str, _Heard] = {}
         self._left_out: set[str] = set()
@@ -80,7 +79,9 @@ class BagRecorder(VisionNode):
         self.get_logger().info(f"recording {', '.join(sorted(self._only)) or 'all topics'} into {output}")
 
     def stop(self) -> None:
-        """Finish the bag."""
+        """Finish the bag, with what has arrived but was not looked at yet."""
+        for heard in self._heard.values():
+            self.catch_up(heard.subscription)
         self._recording.close()
         if self._recording.trouble:
             self.get_logger().error(self._recording.trouble)
@@ -88,8 +89,8 @@ class BagRecorder(VisionNode):
         written = self._recording.received - self._recording.dropped
         self.get_logger().info(f"{self._output}: {written} messages, {self._recording.dropped} dropped")
 
-    def _resolved(self, names: list[str]) -> frozenset[str]:
-        return frozenset(self.resolve_topic_name(name) for name in names if name)
+    def _topics(self, setting: str) -> frozenset[str]:
+        return frozenset(self.resolved(setting, name) for name in self.settings[setting] if name)
 
     def _look(self) -> None:
         """Subscribe to what is new, and anew where a publisher came that offers less; tell of troubles."""
@@ -101,7 +102,7 @@ class BagRecorder(VisionNode):
         if self._recording.trouble:
             self.diagnostics.report(Level.ERROR, self._recording.trouble, "make room and record anew")
             self.exit_code = 1
-        if self._recording.dropped > self._said_dropped:
+        elif self._recording.dropped > self._said_dropped:
             self._said_dropped = self._recording.dropped
             self.complain(
                 str(next(iter(self._heard), "bag")),

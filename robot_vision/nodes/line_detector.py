@@ -23,6 +23,7 @@ from robot_vision.ros.parameters import Setting
 from robot_vision.ros.run import run_node
 
 LIBRARY_SETTINGS = (
+    Setting("method", "trace", "how lines are found", choices=("trace", "hough")),
     Setting("contrast", 10.0, "gradient at which a line may begin, grey levels a pixel", 0.1, 255.0),
     Setting("edge_contrast", 5.0, "gradient at which an edge is followed, grey levels a pixel", 0.1, 255.0),
     Setting("faint", 0.45, "factor on both contrasts when too few lines are found; 1: none", 0.01, 1.0),

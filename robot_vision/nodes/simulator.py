@@ -24,12 +24,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from robot_vision.bags import encode, messages
 from robot_vision.bags.messages import stamp_ns
-from robot_vision.nodes.bag_player import message_type, ready_node
+from robot_vision.nodes.bag_player import message_type
 from robot_vision.ros.diagnostics import TOPIC as DIAGNOSTICS
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.node import VisionNode
 from robot_vision.ros.parameters import ParameterError, Setting
 from robot_vision.ros.qos import ANSWER, EVERY
+from robot_vision.ros.readiness import AwaitedNodes
 from robot_vision.ros.run import run_node
 from robot_vision.simulation import sensed
 from robot_vision.simulation.asked import split_settings
@@ -109,10 +110,7 @@ class Simulator(VisionNode):
         self._advertise()
         self._states = self.create_publisher(DiagnosticArray, DIAGNOSTICS, QoSProfile(depth=10))
         self._steering = self.hear(TwistStamped, "steering", self._hear_steering, EVERY)
-        self._awaited_nodes = frozenset(name.lstrip("/") for name in given["wait_for_nodes"] if name)
-        self._ready_nodes: set[str] = set()
-        if self._awaited_nodes:
-            self.hear(DiagnosticArray, DIAGNOSTICS, self._hear_diagnostics, EVERY)
+        self._awaited_nodes = AwaitedNodes(self, given["wait_for_nodes"])
         self._known: dict[str, int] = {}
         self._settled = 0
         self._begun = self._ended = False
@@ -159,17 +157,9 @@ class Simulator(VisionNode):
             qos = ANSWER if topic == self._format.topic and not self._lockstep else qos
             self._outputs[topic] = self.create_publisher(message_type(kind), topic, qos)
 
-    def _hear_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            if ready_node(status) in self._awaited_nodes:
-                self._ready_nodes.add(ready_node(status))
-
     def _missing(self) -> list[str]:
         """Return what must still happen before the first picture, in plain words."""
-        missing = [
-            f"{name} has not said that it is ready"
-            for name in sorted(self._awaited_nodes - self._ready_nodes)
-        ]
+        missing = self._awaited_nodes.missing()
         counts = {topic: output.get_subscription_count() for topic, output in self._outputs.items()}
         for topic, output in self._outputs.items():
             if counts[topic] < self.count_subscribers(output.topic_name):
@@ -327,15 +317,16 @@ class Simulator(VisionNode):
 def _made_drive(given: dict[str, Any]) -> LiveDrive:
     try:
         world = build_world(given["world"], given["seed"], split_settings(given["settings"]))
-        return LiveDrive(world, _live_settings(given), given["seed"])
+        return LiveDrive(world, _live_settings(given, world.drive.speed), given["seed"])
     except SimulationError as refusal:
         raise ParameterError(str(refusal)) from refusal
 
 
-def _live_settings(given: dict[str, Any]) -> LiveSettings:
+def _live_settings(given: dict[str, Any], usual_speed: float) -> LiveSettings:
+    able = VehicleSettings(kind=given["vehicle"], most_speed=max(3.0, 1.5 * usual_speed))
     return LiveSettings(
         rate=given["rate"],
-        vehicle=VehicleSettings(kind=given["vehicle"]),
+        vehicle=able,
         offset=given["start.offset"],
         yaw=given["start.yaw"],
         lean=given["lean"],

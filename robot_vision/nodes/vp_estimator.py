@@ -7,6 +7,7 @@ when there is something to say.
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -15,8 +16,9 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import CameraInfo, Imu, PointCloud2
 from std_msgs.msg import Header
 
-from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
-from robot_vision.perception.odometry import TurnRateHistory
+from robot_vision.perception.attitude import Lean, lean_from
+from robot_vision.perception.odometry import MotionHistory
+from robot_vision.perception.way import Kind, WayEstimate, WayEstimator
 from robot_vision.ros import calibration, messages, qos
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
@@ -24,6 +26,8 @@ from robot_vision.ros.node import VisionNode, stamp_ns
 from robot_vision.ros.parameters import CAMERA_PLACE, Setting, camera_place
 from robot_vision.ros.run import run_node
 
+FASTEST_TURN = 20.0
+"""Turn rate beyond which odometry is not believed, rad/s: three turns a second."""
 NO_WAY_ADVICE = "look whether the camera sees straight edges that lead ahead"
 
 
@@ -35,16 +39,19 @@ class VpEstimatorNode(VisionNode):
         Setting("lean", 0.035, "usual roll and pitch of the body about its mounting, rad", 0.001, 1.0),
         Setting("lane.narrowest", 0.5, "least width a lane may have, m", 0.05, 100.0),
         Setting("lane.widest", 12.0, "greatest width a lane may have, m", 0.05, 100.0),
-        Setting("path_length", 10.0, "length of path_ahead, m", 1.0, 100.0),
+        Setting("lean_warning", 0.2, "lean of the body at which to warn of tipping over, rad", 0.01, 3.2),
+        Setting(
+            "way", "auto", "auto: a corridor where walls are seen", choices=tuple(kind.value for kind in Kind)
+        ),
+        Setting("path_length", 10.0, "length of path_ahead, m; on a road at most 36", 1.0, 100.0),
     )
 
     def __init__(self) -> None:
         super().__init__("vp_estimator")
-        self._estimator = HeadingEstimator()
+        self._estimator = WayEstimator()
         self._calibration = Calibration(camera_place(self.settings))
-        self._turn_rates = TurnRateHistory()
+        self._motion = MotionHistory()
         self._last_s: float | None = None
-        self._path_length = 0.0
         self._vanishing_points = self.say(PointCloud2, "vanishing_points", qos.ANSWER)
         self._heading = self.say(PoseWithCovarianceStamped, "heading", qos.ANSWER, awaited=True)
         self._attitude = self.say(Imu, "attitude", qos.ANSWER)
@@ -59,28 +66,30 @@ class VpEstimatorNode(VisionNode):
         if values["lane.narrowest"] >= values["lane.widest"]:
             raise ValueError("lane.narrowest must be less than lane.widest")
         self._calibration.move(camera_place(values))
-        self._path_length = values["path_length"]
-        self._estimator.lean = values["lean"]
-        self._estimator.lane_filter.narrowest = values["lane.narrowest"]
-        self._estimator.lane_filter.widest = values["lane.widest"]
+        self._estimator.kind = Kind(values["way"])
+        self._estimator.path_length = values["path_length"]
+        self._estimator.set_lean(values["lean"])
+        self._estimator.set_widths(values["lane.narrowest"], values["lane.widest"])
 
     def warm_up(self) -> None:
         """Load the compiled kernels."""
-        self._estimator.estimator.warm_up()
+        self._estimator.warm_up()
 
     def on_clock_jump_back(self) -> None:
         """Forget what earlier pictures and odometry told."""
         self._estimator.reset()
-        self._turn_rates.clear()
+        self._motion.clear()
         self._last_s = None
 
     def _hear_camera_info(self, message: CameraInfo) -> None:
         self._calibration.take(message)
 
     def _hear_odom(self, message: Odometry) -> None:
-        rate = message.twist.twist.angular.z
-        messages.check_finite({"twist.angular.z": rate})
-        self._turn_rates.add(1e-9 * stamp_ns(message.header.stamp), rate)
+        speed, turn_rate = message.twist.twist.linear.x, message.twist.twist.angular.z
+        messages.check_finite({"twist.linear.x": speed, "twist.angular.z": turn_rate})
+        if abs(turn_rate) > FASTEST_TURN:
+            raise ValueError(f"twist.angular.z is {turn_rate:g} rad/s: no robot turns so fast")
+        self._motion.add(1e-9 * stamp_ns(message.header.stamp), speed, turn_rate)
 
     def _hear_lines(self, message: PointCloud2) -> None:
         began = time.perf_counter()
@@ -100,27 +109,46 @@ class VpEstimatorNode(VisionNode):
             self._say_vanishing_points(message.header, None)
             return
         now_s = 1e-9 * stamp_ns(message.header.stamp)
-        turn_rate = self._turn_rates.mean(now_s if self._last_s is None else self._last_s, now_s)
+        since_s = now_s if self._last_s is None else self._last_s
+        speed, turn_rate = self._motion.mean(since_s, now_s)
         self._last_s = now_s
-        estimate = self._estimator.update(lines, camera, now_s, turn_rate)
+        try:
+            estimate = self._estimator.update(lines, camera, now_s, speed, turn_rate)
+        except Exception:
+            # whoever waits for this picture must not wait in vain
+            self._say_vanishing_points(message.header, None)
+            raise
         self._say(message.header, estimate)
         self.answered(message.header.stamp, began)
 
-    def _say(self, header: Header, estimate: HeadingEstimate) -> None:
+    def _say(self, header: Header, estimate: WayEstimate) -> None:
         lane = estimate.lane
+        # Before the heading, which whoever steers takes as the word to go.
+        if estimate.path is not None and self._path.get_subscription_count():
+            self._path.publish(messages.path_to_message(header, estimate.path))
         if lane is not None:
-            self._heading.publish(messages.heading_to_message(header, lane))
+            self._heading.publish(messages.heading_to_message(header, lane, estimate.frame))
         self._say_vanishing_points(header, estimate)
         if estimate.attitude is not None and estimate.attitude.seen:
             self._attitude.publish(messages.attitude_to_message(header, estimate.attitude))
-        if lane is not None and lane.offset_known and self._path.get_subscription_count():
-            self._path.publish(messages.straight_path(header, lane, self._path_length))
+        lean = self._lean(estimate)
         if lane is None:
             self.diagnostics.report(Level.WARN, estimate.reason, NO_WAY_ADVICE)
+        elif lean is not None and lean.angle >= self.settings["lean_warning"]:
+            tipping = f"may tip over: leans {math.degrees(lean.angle):.0f} degrees ({lean.towards})"
+            self.diagnostics.report(Level.WARN, tipping, "slow down, or look whether camera.pitch is right")
         else:
-            self.diagnostics.report(Level.OK, estimate.reason or "knows heading and offset")
+            known = f"knows heading and offset in a {estimate.frame}"
+            self.diagnostics.report(Level.OK, estimate.reason or known)
 
-    def _say_vanishing_points(self, header: Header, estimate: HeadingEstimate | None) -> None:
+    def _lean(self, estimate: WayEstimate) -> Lean | None:
+        """Lean of the robot, where the picture tells of it."""
+        attitude, camera = estimate.attitude, self._calibration.camera
+        if attitude is None or not attitude.seen or camera is None:
+            return None
+        return lean_from(attitude.roll, attitude.pitch, camera.roll, camera.pitch)
+
+    def _say_vanishing_points(self, header: Header, estimate: WayEstimate | None) -> None:
         found = None if estimate is None else estimate.vanishing_points
         self._vanishing_points.publish(messages.vanishing_points_to_message(header, found))
 

@@ -15,6 +15,10 @@ from robot_vision.perception.vanishing import Role, VanishingPoints
 Array = NDArray[np.float64]
 
 
+#: Support of a vertical vanishing point that is believed though no track of it is.
+_CLEAR = 15.0
+
+
 @dataclass(frozen=True)
 class Attitude:
     """Lean of the camera body.
@@ -35,8 +39,40 @@ class Attitude:
     up_covariance: Array
     seen: bool
 
+    @classmethod
+    def from_angles(cls, roll: float, pitch: float, covariance: Array) -> Attitude:
+        """One that a picture told as roll and pitch (rad) with their covariance (2, 2)."""
+        up = up_from_attitude(roll, pitch)
+        jacobian = tangent_of_attitude(up, roll, pitch)
+        return cls(roll, pitch, covariance, up, jacobian @ covariance @ jacobian.T, True)
 
-def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
+
+@dataclass(frozen=True)
+class Lean:
+    """How far a body leans from how it stands upright.
+
+    Attributes:
+        angle: rad.
+        towards: the side it leans to most: left, right, forward or back.
+    """
+
+    angle: float
+    towards: str
+
+
+def lean_from(roll: float, pitch: float, mounted_roll: float, mounted_pitch: float) -> Lean:
+    """Lean of a body whose camera has this roll and pitch, and the mounted ones when the body is upright, rad."""
+    cosine = float(up_from_attitude(roll, pitch) @ up_from_attitude(mounted_roll, mounted_pitch))
+    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    sideways, forwards = roll - mounted_roll, pitch - mounted_pitch
+    if abs(sideways) >= abs(forwards):
+        return Lean(angle, "right" if sideways > 0.0 else "left")
+    return Lean(angle, "forward" if forwards > 0.0 else "back")
+
+
+def estimate_attitude(
+    points: VanishingPoints, lean: float, picture: VanishingPoints | None = None
+) -> Attitude:
     """The vertical that agrees best with the vertical vanishing point, the horizontal ones and the mounting.
 
     A vertical vanishing point names the vertical itself; each horizontal one says that the vertical lies at right
@@ -45,9 +81,11 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     Args:
         points: with roles; `points.camera` tells how the camera is mounted.
         lean: standard deviation of the body's lean about the mounting, rad.
+        picture: those of this picture alone. A body may roll faster than a track of the vertical follows; then the
+            vertical of the picture itself tells, if it has much support.
     """
     mounted = points.camera.optical_to_base[2]
-    vertical = points.of(Role.VERTICAL)
+    vertical = _vertical(points, picture)
     level = np.isin(points.roles, [Role.PRIMARY, Role.HORIZONTAL])
     directions, covariance = points.directions[level], points.covariance[level]
     tangents = tangent_basis(directions)
@@ -63,14 +101,15 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
         pull = prior @ local_coordinates(up, mounted) - weighted.T @ (directions @ up)
         if vertical is not None:
             # The covariance holds in the tangent plane of the point; carry it over to that of `up`.
-            carried = basis @ tangent_basis(points.directions[vertical]).T
-            own = np.linalg.inv(carried @ points.covariance[vertical] @ carried.T)
+            direction, doubt = vertical
+            carried = basis @ tangent_basis(direction).T
+            own = np.linalg.inv(carried @ doubt @ carried.T)
             information = information + own
-            pull = pull + own @ local_coordinates(up, points.directions[vertical])
+            pull = pull + own @ local_coordinates(up, direction)
         up = retract(up, np.asarray(np.linalg.solve(information, pull), dtype=np.float64))
     up_covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     roll, pitch = attitude_from_up(up)
-    jacobian = _tangent_of_attitude(up, roll, pitch)
+    jacobian = tangent_of_attitude(up, roll, pitch)
     inverse = np.linalg.inv(jacobian)
     telling = np.isin(points.roles, [Role.PRIMARY, Role.VERTICAL, Role.HORIZONTAL])
     seen = bool(np.any(telling & (points.weight > 0.0)))
@@ -78,7 +117,19 @@ def estimate_attitude(points: VanishingPoints, lean: float) -> Attitude:
     return Attitude(roll, pitch, covariance, up, up_covariance, seen)
 
 
-def _tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
+def _vertical(points: VanishingPoints, picture: VanishingPoints | None) -> tuple[Array, Array] | None:
+    """The vertical direction and its covariance: after a jolt an unseen track may live on beside what is seen."""
+    for told, least in ((points, 0.0), (picture, _CLEAR), (points, -1.0)):
+        if told is None:
+            continue
+        upright = np.flatnonzero((told.roles == Role.VERTICAL) & (told.weight > least))
+        if len(upright):
+            best = int(upright[np.argmax(told.weight[upright])])
+            return told.directions[best], told.covariance[best]
+    return None
+
+
+def tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
     """How `up` moves in its tangent plane with roll and pitch: (2, 2), by central differences."""
     step = 1e-6
     columns = [

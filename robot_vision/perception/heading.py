@@ -15,6 +15,7 @@ from robot_vision.perception.lane import LaneFilter, LaneHeading
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing import Role, VanishingPointEstimator, VanishingPoints
 from robot_vision.perception.vanishing.floor import led_by_the_floor
+from robot_vision.perception.vanishing.pavement import PavementSpacings
 from robot_vision.perception.vanishing.tracker import VanishingPointTracker
 
 Array = NDArray[np.float64]
@@ -45,6 +46,7 @@ class HeadingEstimator:
     Args:
         estimator: of the vanishing points of one picture.
         tracker: of vanishing points over time.
+        pavement: takes the spacings of flagstones as a further source of the vanishing points.
         lane_filter: of offset and width.
         lean: standard deviation of the body's roll and pitch about the camera's mounting, rad.
 
@@ -54,6 +56,7 @@ class HeadingEstimator:
 
     estimator: VanishingPointEstimator = field(default_factory=VanishingPointEstimator)
     tracker: VanishingPointTracker = field(default_factory=VanishingPointTracker)
+    pavement: PavementSpacings = field(default_factory=PavementSpacings)
     lane_filter: LaneFilter = field(default_factory=LaneFilter)
     lean: float = float(np.deg2rad(2.0))
 
@@ -80,13 +83,14 @@ class HeadingEstimator:
         camera = camera.rectified()
         ahead = self.tracker.predict(stamp_s, camera, turn_rate)
         seen = self.estimator.estimate(lines, camera, ahead)
-        points = _with_doubt_of_focal_length(self.tracker.update(led_by_the_floor(seen, lines)))
+        led = self.pavement.fuse(led_by_the_floor(seen, lines), lines)
+        points = _with_doubt_of_focal_length(self.tracker.update(led))
         if not len(points):
             few = (
                 f"only {len(lines)} lines" if len(lines) < _FEW_LINES else f"none of {len(lines)} lines agree"
             )
             return HeadingEstimate(points, None, None, f"no vanishing point: {few}")
-        attitude = estimate_attitude(points, self.lean)
+        attitude = estimate_attitude(points, self.lean, seen)
         primary = points.of(Role.PRIMARY)
         if primary is None:
             return HeadingEstimate(

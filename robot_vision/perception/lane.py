@@ -45,6 +45,7 @@ class LaneHeading:
         offset: of the robot to the left of the centre line, m; 0 when unknown.
         offset_variance: m^2; inf when the offset is unknown.
         width: between the two walls, m; 0 when unknown.
+        curvature: of the lane beside the robot, 1/m, to the left positive.
     """
 
     yaw: float
@@ -52,6 +53,7 @@ class LaneHeading:
     offset: float = 0.0
     offset_variance: float = float("inf")
     width: float = 0.0
+    curvature: float = 0.0
 
     @property
     def offset_known(self) -> bool:

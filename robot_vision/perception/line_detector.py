@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Literal, Protocol
 
 import cv2
 import numpy as np
@@ -12,23 +12,28 @@ from numpy.typing import NDArray
 
 from robot_vision.perception.segments import LineSegments
 
-if TYPE_CHECKING:
-    from robot_vision.perception.tracing import TraceFinder
-
 Gray = NDArray[np.uint8]
+Method = Literal["trace", "hough"]
 #: Pictures smaller than this in either direction hold no line worth the name.
 SMALLEST = 8
+
+
+class _Finder(Protocol):
+    """A way of finding lines in pictures of one size."""
+
+    def find(self, gray: Gray) -> LineSegments: ...
 
 
 @dataclass
 class LineDetector:
     """Finds straight edges, each placed to a fraction of a pixel by the edge points that support it.
 
-    Edges are followed along a running fit (`perception.tracing`). Of the lines it finds most lead to a vanishing point
-    where there is one; a Hough transform with refit and regions of one gradient direction find fewer such lines or
-    more others, place them worse, and cost five times as much.
+    `trace` follows edges along a running fit; `hough` takes Canny edges through the probabilistic Hough transform
+    and refits every line to the gradient around it. `trace` finds twice as many of the lines a person draws, places
+    them better and costs less, so it is the default. All settings mean the same to both.
 
     Args:
+        method: `trace` or `hough`.
         contrast: gradient at which a line may begin, grey levels a pixel.
         edge_contrast: gradient at which an edge may be followed, grey levels a pixel.
         faint: factor on both contrasts for a second look when fewer than `enough` lines were found; 1 means none.
@@ -43,6 +48,7 @@ class LineDetector:
         ValueError: for settings without meaning, naming the setting.
     """
 
+    method: Method = "trace"
     contrast: float = 10.0
     edge_contrast: float = 5.0
     faint: float = 0.45
@@ -51,10 +57,12 @@ class LineDetector:
     max_gap: int = 4
     blur: float = 0.8
     largest_area: int = 500_000
-    _finder: TraceFinder | None = field(default=None, init=False, repr=False, compare=False)
+    _finder: _Finder | None = field(default=None, init=False, repr=False, compare=False)
     _shape: tuple[int, ...] = field(default=(), init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if self.method not in ("trace", "hough"):
+            raise ValueError(f"method must be 'trace' or 'hough', not {self.method!r}")
         for name in ("contrast", "edge_contrast", "min_length"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
@@ -101,18 +109,28 @@ class LineDetector:
         """Load or compile the kernels, so that the first picture is not kept waiting."""
         picture = np.full((48, 64), 40, np.uint8)
         picture[:, 32:] = 200
-        LineDetector(min_length=10.0).detect(picture)
+        LineDetector(method=self.method, min_length=10.0).detect(picture)
 
-    def _finder_for(self, shape: tuple[int, ...]) -> TraceFinder:
+    def _finder_for(self, shape: tuple[int, ...]) -> _Finder:
         if self._finder is None or self._shape != shape:
             self._finder = self._make_finder(shape)
             self._shape = shape
         return self._finder
 
-    def _make_finder(self, shape: tuple[int, ...]) -> TraceFinder:
+    def _make_finder(self, shape: tuple[int, ...]) -> _Finder:
         levels = [(self.contrast, self.edge_contrast)]
         if self.faint < 1.0:
             levels.append((self.contrast * self.faint, self.edge_contrast * self.faint))
+        if self.method == "hough":
+            from robot_vision.perception.hough import HoughFinder
+
+            return HoughFinder(
+                blur=self.blur,
+                levels=levels,
+                enough=self.enough,
+                min_length=self.min_length,
+                max_gap=self.max_gap,
+            )
         from robot_vision.perception.tracing import TraceFinder
 
         return TraceFinder(

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fast the robot turned between two pictures, from odometry that comes at a rhythm of its own."""
+"""How fast the robot drove and turned between two pictures, from odometry that comes at a rhythm of its own."""
 
 from __future__ import annotations
 
 from collections import deque
 
 
-class TurnRateHistory:
-    """Keeps turn rates with their stamps and tells their mean over the time between two pictures.
+class RateHistory:
+    """Keeps rates (of turn, or speeds) with their stamps and tells their mean over the time between two pictures.
 
     Args:
         longest: odometry older than this before a picture says nothing about it, s.
@@ -18,18 +18,18 @@ class TurnRateHistory:
         self._longest = longest
         self._rates: deque[tuple[float, float]] = deque(maxlen=most)
 
-    def add(self, stamp_s: float, turn_rate: float) -> None:
-        """Take in a turn rate (rad/s, counter-clockwise); a stamp that goes back forgets all before."""
+    def add(self, stamp_s: float, rate: float) -> None:
+        """Take in a rate, in any unit; a stamp that goes back forgets all before."""
         if self._rates and stamp_s < self._rates[-1][0]:
             self._rates.clear()
-        self._rates.append((stamp_s, turn_rate))
+        self._rates.append((stamp_s, rate))
 
     def clear(self) -> None:
         """Forget all."""
         self._rates.clear()
 
     def mean(self, since_s: float, until_s: float) -> float | None:
-        """Mean rate from one picture to the next, rad/s; None when odometry is missing or too old.
+        """Mean rate from one picture to the next; None when odometry is missing or too old.
 
         Each rate holds from the stamp before it to its own, the last one until the picture.
         """
@@ -49,3 +49,25 @@ class TurnRateHistory:
         total += newest[1] * (until_s - before)
         covered += until_s - before
         return total / covered if covered > 0.0 else newest[1]
+
+
+class MotionHistory:
+    """Keeps speeds and turn rates with their stamps, as two `RateHistory`."""
+
+    def __init__(self) -> None:
+        self._speeds = RateHistory()
+        self._turn_rates = RateHistory()
+
+    def add(self, stamp_s: float, speed: float, turn_rate: float) -> None:
+        """Take in a speed (m/s) and a turn rate (rad/s, counter-clockwise)."""
+        self._speeds.add(stamp_s, speed)
+        self._turn_rates.add(stamp_s, turn_rate)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._speeds.clear()
+        self._turn_rates.clear()
+
+    def mean(self, since_s: float, until_s: float) -> tuple[float | None, float | None]:
+        """Mean speed and turn rate from one picture to the next; None when odometry is missing or too old."""
+        return self._speeds.mean(since_s, until_s), self._turn_rates.mean(since_s, until_s)

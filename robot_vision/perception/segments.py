@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+#: A line of which nothing else is known is placed this well, px.
+USUAL_SIGMA = 0.3
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,9 @@ class LineSegments:
         return cls(np.zeros((0, 4)), np.zeros(0), np.zeros(0))
 
     @classmethod
-    def from_endpoints(cls, endpoints: Array, strength: float = 10.0, sigma: float = 0.3) -> LineSegments:
+    def from_endpoints(
+        cls, endpoints: Array, strength: float = 10.0, sigma: float = USUAL_SIGMA
+    ) -> LineSegments:
         """Segments known by their ends alone (N, 4), with the same strength and sigma for all."""
         count = len(endpoints)
         return cls(endpoints, np.full(count, strength), np.full(count, sigma))

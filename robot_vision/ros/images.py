@@ -111,6 +111,20 @@ class Rectifier:
             return np.array(picture)
         return np.asarray(cv2.remap(picture, *self._maps, cv2.INTER_LINEAR))
 
+    def field(self, message: Image | CompressedImage) -> Picture:
+        """Give the rectified picture of a message as it came, BGR (H, W, 3) or grey (H, W), uint8; to be read only.
+
+        Raises:
+            PictureError: as for `gray`.
+        """
+        picture = picture_of(message)
+        if picture.ndim == 2:
+            picture = to_gray(picture)
+        self._check_size(picture)
+        if self._maps is None:
+            return picture
+        return np.asarray(cv2.remap(picture, *self._maps, cv2.INTER_LINEAR))
+
     def _gray_of(self, message: Image | CompressedImage) -> Gray:
         if isinstance(message, CompressedImage):
             return gray_from_compressed(bytes(message.data))

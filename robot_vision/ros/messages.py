@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import Imu, PointCloud2, PointField, Range
 from std_msgs.msg import Header
 
+from robot_vision.geometry import Camera
 from robot_vision.geometry.rotation import (
     quaternion_from_rotation,
     quaternion_to_rotation,
@@ -24,13 +25,13 @@ from robot_vision.geometry.rotation import (
 from robot_vision.perception import LineSegments, VanishingPoints
 from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.lane import LaneHeading
+from robot_vision.perception.segments import USUAL_SIGMA
 
 #: Variance of a part that is not known.
 UNKNOWN = 1e6
-#: A line without a `sigma` is placed this well, px.
-USUAL_SIGMA = 0.3
-
-LINES_LAYOUT = np.dtype([(name, "<f4") for name in ("x1", "y1", "x2", "y2", "strength", "sigma")])
+LINES_LAYOUT = np.dtype([(name, "<f4") for name in ("x1", "y1", "x2", "y2", "strength")])
+#: The body of the camera: x ahead along the lens, y left, z up (REP-103), unlike the optical frame of its pictures.
+CAMERA_BODY = "camera_link"
 VANISHING_POINTS_LAYOUT = np.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "u", "v", "sigma", "weight")]
     + [("id", "<u4"), ("role", "<u4")]
@@ -107,27 +108,23 @@ def lines_to_message(header: Header, lines: LineSegments) -> PointCloud2:
     for column, name in enumerate(("x1", "y1", "x2", "y2")):
         points[name] = lines.endpoints[:, column]
     points["strength"] = lines.strength
-    points["sigma"] = lines.sigma
     return cloud_from_points(header, points)
 
 
 def lines_from_message(cloud: PointCloud2) -> LineSegments:
-    """Read the `lines` message, whose `sigma` may be absent.
+    """Read the `lines` message; how well each line is placed is not in it, so all are taken to be alike.
 
     Raises:
         MessageError: fields are missing, or a number is not finite.
     """
     points = points_from_cloud(cloud, ("x1", "y1", "x2", "y2", "strength"))
-    names = points.dtype.names or ()
-    columns = {name: points[name].astype(np.float64) for name in LINES_LAYOUT.names or () if name in names}
-    if "sigma" not in columns:
-        columns["sigma"] = np.full(len(points), USUAL_SIGMA)
+    columns = {name: points[name].astype(np.float64) for name in LINES_LAYOUT.names or ()}
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise MessageError(f"{name} of line {bad[0]} is {values[bad[0]]} ({len(bad)} lines are so)")
     ends = np.column_stack([columns[name] for name in ("x1", "y1", "x2", "y2")])
-    return LineSegments(ends, columns["strength"], columns["sigma"])
+    return LineSegments(ends, columns["strength"], np.full(len(points), USUAL_SIGMA))
 
 
 def vanishing_points_to_message(header: Header, found: VanishingPoints | None) -> PointCloud2:
@@ -143,6 +140,37 @@ def vanishing_points_to_message(header: Header, found: VanishingPoints | None) -
         points["id"] = found.ids
         points["role"] = found.roles
     return cloud_from_points(header, points)
+
+
+def vanishing_points_from_message(cloud: PointCloud2, camera: Camera) -> VanishingPoints:
+    """Read the `vanishing_points` message; which line belongs to which point is not in it.
+
+    Args:
+        cloud: the message.
+        camera: of the picture.
+
+    Raises:
+        MessageError: fields are missing, or a number is not finite.
+    """
+    points = points_from_cloud(cloud, ("x", "y", "z", "sigma", "weight", "id", "role"))
+    for name in ("x", "y", "z", "sigma", "weight"):
+        bad = np.flatnonzero(~np.isfinite(points[name]))
+        if len(bad):
+            raise MessageError(f"{name} of vanishing point {bad[0]} is {points[name][bad[0]]}")
+    directions = np.column_stack([points[name].astype(np.float64) for name in "xyz"])
+    length = np.linalg.norm(directions, axis=1)
+    if (length < 1e-6).any():
+        raise MessageError(f"vanishing point {int(np.argmin(length))} has no direction")
+    sigma = np.maximum(points["sigma"].astype(np.float64), 1e-6)
+    return VanishingPoints(
+        directions=directions / length[:, None],
+        covariance=sigma[:, None, None] ** 2 * np.eye(2),
+        weight=points["weight"].astype(np.float64),
+        roles=points["role"].astype(np.uint32),
+        ids=points["id"].astype(np.uint32),
+        labels=np.zeros(0, np.intp),
+        camera=camera,
+    )
 
 
 def heading_to_message(
@@ -165,15 +193,16 @@ def heading_from_message(message: PoseWithCovarianceStamped) -> LaneHeading:
     """Read the `heading` message; the width of the lane is not in it.
 
     Raises:
-        MessageError: a number is not finite, the orientation is none, or a variance is negative.
+        MessageError: a number is not finite, the orientation is none, or a variance is negative. A variance
+            without end is one: it says that nothing is known.
     """
     pose, covariance = message.pose.pose, message.pose.covariance
     q = pose.orientation
     numbers = {
         "position.y": pose.position.y,
         **{f"orientation.{axis}": getattr(q, axis) for axis in "xyzw"},
-        "the variance of y": covariance[7],
-        "the variance of yaw": covariance[35],
+        "the variance of y": min(covariance[7], UNKNOWN),
+        "the variance of yaw": min(covariance[35], UNKNOWN),
     }
     check_finite(numbers)
     for name in ("the variance of y", "the variance of yaw"):
@@ -197,7 +226,8 @@ def heading_from_message(message: PoseWithCovarianceStamped) -> LaneHeading:
 
 def attitude_to_message(header: Header, attitude: Attitude) -> Imu:
     """Build the `attitude` message: roll and pitch of the camera's body; yaw is not known."""
-    message = Imu(header=header, orientation=_quaternion(attitude.roll, attitude.pitch, 0.0))
+    own = Header(stamp=header.stamp, frame_id=CAMERA_BODY)
+    message = Imu(header=own, orientation=_quaternion(attitude.roll, attitude.pitch, 0.0))
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = attitude.covariance
     covariance[2, 2] = UNKNOWN
@@ -207,27 +237,28 @@ def attitude_to_message(header: Header, attitude: Attitude) -> Imu:
     return message
 
 
-def straight_path(header: Header, lane: LaneHeading, length: float, step: float = 0.5) -> Path:
-    """Build `path_ahead`: the straight centre line of the lane, in base_link.
+def attitude_from_message(message: Imu) -> tuple[float, float]:
+    """Read roll and pitch (rad) of the `attitude` message.
 
-    Args:
-        header: of the picture; its stamp is kept.
-        lane: with a known offset.
-        length: of the line, from the point nearest to the robot, m.
-        step: between its points, m.
+    Raises:
+        MessageError: its orientation is marked absent, is not finite, or names none.
     """
-    way = np.arange(0.0, length + 0.5 * step, step)
-    sine, cosine = math.sin(lane.yaw), math.cos(lane.yaw)
-    # the lane lies at -yaw seen from the robot; its nearest point is `offset` to the right of it
-    x = way * cosine - lane.offset * sine
-    y = -way * sine - lane.offset * cosine
-    return path_to_message(header, np.column_stack([x, y]))
+    q = message.orientation
+    check_finite({f"orientation.{axis}": getattr(q, axis) for axis in "xyzw"})
+    if message.orientation_covariance[0] < 0.0:
+        raise MessageError("its orientation is marked as absent (covariance -1)")
+    try:
+        rotation = quaternion_to_rotation((q.x, q.y, q.z, q.w))
+    except ValueError as error:
+        raise MessageError(f"orientation names no direction: {error}") from error
+    roll, pitch, _ = rpy_from_rotation(rotation)
+    return roll, pitch
 
 
-def path_to_message(header: Header, points: ArrayLike) -> Path:
-    """Build a Path in base_link through (N, 2) points (m), each turned towards the next."""
-    xy = np.asarray(points, np.float64)
-    own = Header(stamp=header.stamp, frame_id="base_link")
+def path_to_message(header: Header, points: ArrayLike, frame: str = "base_link") -> Path:
+    """Build a Path in a frame through (N, 2) points (m), each turned towards the next."""
+    xy = np.asarray(points, np.float64).reshape(-1, 2)
+    own = Header(stamp=header.stamp, frame_id=frame)
     along = np.diff(xy, axis=0, append=xy[-1:] + (xy[-1:] - xy[-2:-1]))
     message = Path(header=own)
     for (x, y), (dx, dy) in zip(xy.tolist(), along.tolist(), strict=True):
@@ -235,6 +266,22 @@ def path_to_message(header: Header, points: ArrayLike) -> Path:
         pose.position.x, pose.position.y = x, y
         message.poses.append(PoseStamped(header=own, pose=pose))
     return message
+
+
+def path_from_message(message: Path) -> NDArray[np.float64]:
+    """Read the points (N, 2) of a Path in base_link, m.
+
+    Raises:
+        MessageError: it is in another frame, or a number is not finite.
+    """
+    if message.header.frame_id != "base_link":
+        raise MessageError(f"the path is in the frame {message.header.frame_id!r}; base_link is understood")
+    places = [pose.pose.position for pose in message.poses]
+    points = np.array([(place.x, place.y) for place in places], np.float64).reshape(-1, 2)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise MessageError(f"point {bad[0]} of the path is {points[bad[0]].tolist()}")
+    return points
 
 
 def steering_to_message(header: Header, speed: float, turn_rate: float) -> TwistStamped:

@@ -19,12 +19,14 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
+from rclpy.validate_topic_name import validate_topic_name
 
 from robot_vision.ros.diagnostics import NUMBER, Diagnostics, Level
 from robot_vision.ros.parameters import ParameterError, Setting, changed, declare
@@ -168,6 +170,19 @@ class VisionNode(Node):
         if awaited:
             self._awaited.append(publisher)
         return publisher
+
+    def resolved(self, setting: str, name: str) -> str:
+        """Give the full name, namespace and remaps applied, of a topic that a parameter names.
+
+        Raises:
+            ParameterError: it is no name of a topic.
+        """
+        try:
+            validate_topic_name(name)
+        except InvalidTopicNameException as refusal:
+            reason = str(refusal).splitlines()[0]
+            raise ParameterError(f"{setting} must hold names of topics, not {name!r}: {reason}") from refusal
+        return self.resolve_topic_name(name)
 
     def catch_up(self, subscription: Subscription) -> None:
         """Take all that waits on a topic now.

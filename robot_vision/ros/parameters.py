@@ -69,6 +69,8 @@ class Setting:
         kind = type(self.default)
         if kind in _KINDS and type(value) is not kind:
             raise ParameterError(f"{self.name} must be {_KINDS[kind]}, not {value!r}")
+        if kind is list and not (isinstance(value, list) and all(isinstance(each, str) for each in value)):
+            raise ParameterError(f"{self.name} must be a list of texts such as ['a', 'b'], not {value!r}")
         if isinstance(value, float) and not math.isfinite(value):
             raise ParameterError(f"{self.name} must be a finite number, not {value}")
         if self.low is not None and self.high is not None and not self.low <= value <= self.high:

@@ -32,11 +32,13 @@ from robot_vision.simulation.furniture import (
     Piece,
     Place,
     chair,
+    crate,
     person_sized_box,
     waste_bin,
 )
 from robot_vision.simulation.lighting import RoomLight
 from robot_vision.simulation.scene import Illumination, Scene
+from robot_vision.simulation.texture import Texture
 from robot_vision.simulation.world import SceneObject, World, walls_around
 
 __all__ = ["BlockedSettings", "CorridorSettings", "corridor", "corridor_blocked"]
@@ -80,7 +82,7 @@ def corridor(settings: CorridorSettings | None = None, seed: int = 0) -> World:
     if shape.narrow_at:
         pieces, jambs = portal(plan.walls[0], gates[0], shape.narrow_width, shape.width, palette)
         quads += pieces
-    things = _furnish(np.random.default_rng((seed, 5)), shape, plan, doors)
+    things = _furnish(np.random.default_rng((seed, 5)), shape, plan, doors, palette.floor)
     quads += [item for piece in things for item in piece.quads]
     objects = tuple(piece.thing for piece in things)
 
@@ -134,9 +136,13 @@ def _clear_of(place: float, gate: float | None) -> bool:
 
 
 def _furnish(
-    random: np.random.Generator, shape: CorridorSettings, plan: Plan, doors: dict[int, list[float]]
+    random: np.random.Generator,
+    shape: CorridorSettings,
+    plan: Plan,
+    doors: dict[int, list[float]],
+    floor: Texture,
 ) -> list[Piece]:
-    """The box in the way, and bins and chairs spread along the walls, none before a door."""
+    """The box in the way, and what is spread along the walls, none of it before a door."""
     things: list[Piece] = []
     if shape.box_at:
         middle = plan.lane.point(shape.box_at)
@@ -144,6 +150,7 @@ def _furnish(
         y = middle.y + shape.box_offset * np.cos(middle.yaw)
         things.append(person_sized_box(random, Place(x, y, middle.yaw + np.pi)))
     kinds = ["waste bin"] * int(shape.bins) + ["chair"] * int(shape.chairs)
+    kinds += ["crate"] * int(shape.crates) + ["disguised crate"] * int(shape.disguised)
     kinds = [kinds[index] for index in random.permutation(len(kinds))]
     free = _free_places(shape, plan, doors)
     start, end = 2.6, plan.lane.length - 1.2
@@ -154,14 +161,17 @@ def _furnish(
         if not here:
             raise SimulationError(
                 f"corridor: there is no room along its walls for {len(kinds)} things; "
-                "give a greater length, a greater door_spacing or fewer bins and chairs"
+                "give a greater length, a greater door_spacing or fewer bins, chairs and crates"
             )
         along, (bin_place, chair_place) = here[int(random.integers(len(here)))]
         free = [other for other in free if abs(other[0] - along) > SPACING_M]
+        name = f"{kind} {number + 1}"
         if kind == "chair":
-            things.append(chair(random, chair_place, f"chair {number + 1}"))
+            things.append(chair(random, chair_place, name))
+        elif kind == "waste bin":
+            things.append(waste_bin(random, bin_place, name))
         else:
-            things.append(waste_bin(random, bin_place, f"waste bin {number + 1}"))
+            things.append(crate(random, bin_place, name, floor if kind == "disguised crate" else None))
     return things
 
 

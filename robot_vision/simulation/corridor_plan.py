@@ -33,6 +33,8 @@ class CorridorSettings:
         box_offset: of the box, to the left of the middle line.
         bins: number of waste bins along the walls.
         chairs: number of chairs along the walls.
+        crates: number of plain crates along the walls, each of another size and colour.
+        disguised: number of crates along the walls that are clad with the very floor they stand on.
     """
 
     length: float = 24.0
@@ -47,6 +49,8 @@ class CorridorSettings:
     box_offset: float = 0.0
     bins: float = 0
     chairs: float = 0
+    crates: float = 0
+    disguised: float = 0
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -70,7 +74,7 @@ class CorridorSettings:
             self._check("box_at", max(2.5, self.length - 90.0), self.length - 1.0, " m here")
             side = (self.width - BOX_SIZE[1]) / 2
             self._check("box_offset", -side, side, " m here")
-        for name in ("bins", "chairs"):
+        for name in ("bins", "chairs", "crates", "disguised"):
             self._check(name, 0, 50, "")
             if getattr(self, name) != int(getattr(self, name)):
                 raise SimulationError(f"corridor: {name} must be a whole number, not {getattr(self, name)}")

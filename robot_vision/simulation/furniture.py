@@ -178,6 +178,23 @@ def chair(random: np.random.Generator, place: Place, name: str = "chair") -> Pie
     )
 
 
+def crate(
+    random: np.random.Generator, place: Place, name: str = "crate", cladding: Texture | None = None
+) -> Piece:
+    """A box with bare sides, 0.2 to 0.5 m high and as wide as a waste bin, dark, light, coloured or clad.
+
+    One that is clad is 0.3 m high or more: what looks like its floor is seen by its motion, which needs height.
+    """
+    colours = ((66, 66, 68), (212, 208, 198), (58, 96, 74), (146, 84, 60), (96, 88, 128))
+    colour = colours[int(random.integers(len(colours)))]
+    lowest = 0.2 if cladding is None else 0.3
+    height, half = float(random.uniform(lowest, 0.5)), BIN_RADIUS
+    sides = cladding or Texture.plain(materials.linear(*colour))
+    quads = box((-half, -half, 0.0), (half, half, height), sides, without="-z")
+    thing = SceneObject(name, place.outline(rectangle(2 * half, 2 * half)), height)
+    return Piece(thing, place.put(quads))
+
+
 def pillar(stone: Texture, place: Place, name: str = "pillar", ground: float = 0.0) -> Piece:
     """A round column of stone on a square plinth, with a square slab on top; `ground` is the height it stands at."""
     half, top = PLINTH_SIDE / 2, PILLAR_HEIGHT - 0.14

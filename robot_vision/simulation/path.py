@@ -150,7 +150,7 @@ def path(settings: PathSettings | None = None, seed: int = 0) -> PavedWorld:
     return PavedWorld(
         "path",
         Scene(tuple(lit), materials.linear(150, 168, 150), path_parts.sky(random), 500.0),
-        "path",
+        "corridor",
         StraightLane(shape.length, shape.width),
         objects=(
             *(SceneObject(f"{side} kerb", kerb, KERB_HEIGHT, "wall") for side, kerb in footprints.items()),

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from robot_vision.bags.writer import PARTIAL_SUFFIX
 from robot_vision.simulation.asked import Value
 from robot_vision.simulation.drive import STEPS_PER_SECOND
 from robot_vision.simulation.errors import SimulationError
@@ -53,9 +54,13 @@ def snapshot(
         if len(data) <= LARGEST:
             break
     path = Path(output)
+    if path.exists() and not path.is_file():
+        raise SimulationError(f"cannot write {path}: it is there, and is no file")
+    growing = path.with_name(path.name + PARTIAL_SUFFIX)
     try:
-        path.write_bytes(data.tobytes())
+        growing.write_bytes(data.tobytes())
+        os.replace(growing, path)
     except OSError as error:
-        path.unlink(missing_ok=True)
+        growing.unlink(missing_ok=True)
         raise SimulationError(f"cannot write {path}: {error.strerror}") from error
     return path

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import os
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -331,3 +332,29 @@ def test_memory_stays_within_a_few_chunks(tmp_path: Path) -> None:
         tracemalloc.stop()
         assert count >= 39
         assert peak < 12 * picture.size  # of 40 pictures
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_what_is_no_file_keeps_its_place(tmp_path: Path, in_place: bool) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(BagError, match="not a file"):
+        BagWriter(pipe, in_place=in_place, overwrite=in_place)
+    assert pipe.is_fifo()
+
+
+def test_a_link_stays_and_its_target_is_written(tmp_path: Path) -> None:
+    target, link = tmp_path / "target.mcap", tmp_path / "link.mcap"
+    link.symlink_to(target)
+    written = write_twists(link)
+    assert link.is_symlink() and cdrs(target) == written
+
+
+def test_only_who_may_overwrite_does(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    write_twists(path, 60)
+    with pytest.raises(BagError, match="exists already"):
+        BagWriter(path, in_place=True)
+    assert len(cdrs(path)) == 60
+    assert cdrs(path) != (again := write_twists(path, 3, in_place=True, overwrite=True))
+    assert cdrs(path) == again

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import queue
 import threading
 import time
@@ -106,6 +107,23 @@ def test_a_full_disk_ends_the_recording_with_the_reason(tmp_path: Path) -> None:
     assert "No space left" in recording.trouble and recording.dropped == 1
 
 
+def test_what_a_full_disk_lost_with_the_open_chunk_counts_as_dropped(tmp_path: Path) -> None:
+    class FullDisk(BagWriter):
+        def write(self, topic: str, type_name: str, stamp_ns: int, message: object) -> None:
+            if stamp_ns == 45:
+                self._fail(OSError(errno.ENOSPC, "No space left on device"))
+            super().write(topic, type_name, stamp_ns, message)
+
+    path = tmp_path / "a.mcap"
+    recording = Recording(FullDisk(path, chunk_size=1000, in_place=True))
+    for number in range(50):
+        recording.put("/t", TWIST, number, bytes(100))
+    recording.close()
+    found = len(list(BagReader(path)))
+    assert 0 < found < 45
+    assert (recording.received, recording.dropped) == (50, 50 - found)
+
+
 def test_a_slow_trickle_reaches_the_disk_before_the_end(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     flushed = threading.Event()
@@ -182,8 +200,9 @@ def test_the_end_waits_for_the_last_answer() -> None:
     assert not thread.is_alive()
 
 
-def test_an_empty_bag_ends_also_in_a_loop() -> None:
-    _, out, thread = playback([], Replay(time.monotonic_ns), loop=True)
-    thread.start()
-    thread.join(10)
-    assert not thread.is_alive() and out.empty()
+@pytest.mark.parametrize("loop", [False, True])
+def test_nothing_to_replay_is_said(loop: bool) -> None:
+    player, out, _ = playback([], Replay(time.monotonic_ns), loop=loop)
+    with pytest.raises(BagError, match="no message"):
+        player.run()
+    assert out.empty()

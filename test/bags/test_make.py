@@ -187,6 +187,10 @@ def bad(folder: Path, tmp_path: Path, what: str) -> dict[str, Any]:
         (tmp_path / "c").write_text(YAML.replace("64", "65"))
     elif what == "yaml focal":
         (tmp_path / "c").write_text(YAML.replace("[50, 0, 31", "[0, 0, 31"))
+    elif what == "yaml word":
+        (tmp_path / "c").write_text(YAML.replace("image_width: 64", "image_width: wide"))
+    elif what == "yaml matrix":
+        (tmp_path / "c").write_text("image_width: 64\nimage_height: 48\ncamera_matrix: 5\n")
     elif what == "yaml key":
         (tmp_path / "c").write_text("camera_matrix: {data: [50, 0, 31, 0, 51, 24, 0, 0, 1]}\n")
     elif what == "nonsense":
@@ -213,6 +217,8 @@ def bad(folder: Path, tmp_path: Path, what: str) -> dict[str, Any]:
         ("empty", "no picture in the folder"),
         ("yaml size", "is for 65 x 48 pixels, but the pictures have 64 x 48"),
         ("yaml focal", "calibration .*fx"),
+        ("yaml word", "image_width must be a whole number of pixels, not 'wide'"),
+        ("yaml matrix", "camera_matrix must hold its numbers under data, not 5"),
         ("yaml key", "lacks image_width"),
         ("nonsense", "neither a yaml"),
         ("no calibration", "no calibration file"),
@@ -239,6 +245,8 @@ def test_bad_input_gives_one_line_and_no_bag(folder: Path, tmp_path: Path, what:
         ({"quality": 0, "transport": "compressed"}, "quality goes from 1"),
         ({"calibration": "1,2,3"}, "not 3 in all"),
         ({"calibration": "nan,50,31,24"}, "fx"),
+        ({"prefix": "bad name"}, "'bad name' cannot stand before a topic"),
+        ({"prefix": "1//x"}, "'1//x' cannot stand before a topic"),
         ({"poses": straight_poses(11)}, "11 poses for 12 pictures"),
     ],
 )

@@ -186,6 +186,13 @@ REFUSED_FIELDS = [
     ("fy", inf, "finite"),
     ("cx", nan, "finite"),
     ("fx", "wide", "must be a number, got 'wide'"),
+    ("fx", 10**400, "greater than any"),
+    ("fx", 1e-9, "at least 0.001 px"),
+    ("pitch", 15.0, "is it in degrees?"),
+    ("width", 10**12, "at most 1000000 px"),
+    ("distortion", 5, "sequence of numbers, got 5"),
+    ("distortion", None, "sequence of numbers"),
+    ("distortion", "abcde", "sequence of numbers"),
     ("width", 640.5, "whole number"),
     ("width", nan, "finite"),
     ("height", -1, "above zero"),
@@ -197,6 +204,9 @@ REFUSED_FIELDS = [
     ("x_m", nan, "finite"),
     ("rectification", [[1.0, 0.0], [0.0, 1.0]], "3x3"),
     ("projection", np.eye(3), "3x4"),
+    ("rectification", "abc", "3x3"),
+    ("rectification", [[1.0, 0.0], [1.0]], "3x3"),
+    ("projection", "abc", "3x4"),
 ]
 
 

@@ -8,10 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from random_cameras import cameras, grid, numbers
 
-from robot_vision.geometry import Camera, GroundPlane, GroundPlaneError, up_from_attitude
+from robot_vision.geometry import (
+    AboveHorizonError,
+    Camera,
+    GroundPlane,
+    GroundPlaneError,
+    up_from_attitude,
+    vanishing_line,
+)
+from robot_vision.geometry.sphere import tangent_basis
 
 LEVEL = Camera(500.0, 510.0, 320.0, 240.0, 640, 480, height_m=1.2)
 
@@ -119,3 +128,85 @@ def test_wrong_shape_is_named():
     with pytest.raises(ValueError, match=r"pixels must have shape \(N, 2\), got \(1, 3\)"):
         GroundPlane(LEVEL).from_pixels([[1.0, 2.0, 3.0]])
     assert GroundPlane(LEVEL).from_pixels([]).shape == (0, 2)
+
+
+def test_one_pixel_of_horizon_costs_z_over_h_f():
+    pixel = [[320.0, 300.0]]
+    measured = GroundPlane(LEVEL).measure(pixel, 0.0, np.diag([0.0, (1.0 / 510.0) ** 2]))
+    distance = measured.points[0, 0]
+    sigma = math.sqrt(measured.covariance[0, 0, 0])
+    # Z / (H f), and to the cosine squared of the ray's own fall: pitch turns, a row only shifts
+    assert sigma / distance == pytest.approx(distance / (1.2 * 510.0) * (1.0 + (60.0 / 510.0) ** 2), rel=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(cameras(), numbers(0.0, 1.0), numbers(0.0, 0.01), numbers(0.0, 0.01), numbers(0.0, 0.1))
+def test_covariance_is_what_small_changes_of_pixel_attitude_and_height_do(camera, pixel, roll, pitch, height):
+    ground = GroundPlane(camera)
+    pixels = grid(camera, 5, 4)
+    points = ground.from_pixels(pixels)
+    near = np.hypot(*(points - (camera.x_m, 0.0)).T) < 50.0 * camera.height_m  # nan: not seen
+    pixels, points = pixels[near], points[near]
+    measured = ground.measure(pixels, pixel, np.diag([roll**2, pitch**2]), height * camera.height_m)
+    assert measured.points == pytest.approx(points, rel=1e-12, abs=1e-12)
+
+    def moved(**changes: float) -> np.ndarray:
+        other = replace(camera, **{name: getattr(camera, name) + by for name, by in changes.items()})
+        return GroundPlane(other).from_pixels(pixels)
+
+    step = 1e-5
+    slopes = [(roll, moved(roll=step) - moved(roll=-step)), (pitch, moved(pitch=step) - moved(pitch=-step))]
+    slopes += [(height * camera.height_m, moved(height_m=step) - moved(height_m=-step))]
+    for shift in step * np.eye(2):
+        slopes.append((pixel, ground.from_pixels(pixels + shift) - ground.from_pixels(pixels - shift)))
+    expected = sum(
+        sigma**2 * slope[:, :, None] * slope[:, None, :] / (2.0 * step) ** 2 for sigma, slope in slopes
+    )
+    scale = np.trace(measured.covariance, axis1=1, axis2=2)[:, None, None] + 1e-30
+    assert np.abs((measured.covariance - expected) / scale).max(initial=0.0) < 1e-4
+
+
+@settings(max_examples=60, deadline=None)
+@given(cameras())
+def test_measuring_above_the_horizon_is_refused_by_number(camera):
+    rectified = replace(camera.rectified(), pitch=0.2)
+    line = GroundPlane(rectified).horizon
+    on_it = -line[2] * line[:2]
+    below, above = on_it - 20.0 * line[:2], on_it + 20.0 * line[:2]
+    with pytest.raises(AboveHorizonError, match=r"at or above the horizon.*index 1, 3") as refused:
+        GroundPlane(rectified).measure([below, above, below, above])
+    assert refused.value.indices == (1, 3)
+    assert isinstance(refused.value, GroundPlaneError)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ({"pixel_sigma": -1.0}, "must not be negative"),
+        ({"height_sigma": -1.0}, "must not be negative"),
+        ({"attitude_covariance": np.diag([1.0, -1.0])}, "must be a covariance"),
+        ({"attitude_covariance": np.eye(3)}, "must be a covariance"),
+    ],
+)
+def test_a_spread_that_is_none_is_refused(arguments, reason):
+    with pytest.raises(GroundPlaneError, match=reason):
+        GroundPlane(LEVEL).measure([[320.0, 300.0]], **arguments)
+
+
+@settings(max_examples=60, deadline=None)
+@given(cameras(), st.tuples(*[numbers(-1.0, 1.0)] * 3).filter(lambda n: np.linalg.norm(n) > 0.05))
+def test_every_direction_in_a_plane_vanishes_on_its_line(camera, normal):
+    normal = np.array(normal)
+    basis = tangent_basis(normal / np.linalg.norm(normal))
+    turns = np.linspace(0.0, math.pi, 37)
+    directions = np.column_stack([np.cos(turns), np.sin(turns)]) @ basis
+    directions = directions[np.abs(directions[:, 2]) > 1e-6]
+    pixels = camera.rectified().pixels(directions * np.sign(directions[:, 2:]))
+    distance = np.column_stack([pixels, np.ones(len(pixels))]) @ vanishing_line(camera, 3.0 * normal)
+    assert np.abs(distance / (1.0 + np.hypot(*pixels.T))).max(initial=0.0) < 1e-9
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 0), (1, 2), (1, 2, math.nan)])
+def test_a_normal_that_is_none_is_refused(normal):
+    with pytest.raises(ValueError, match="normal must be three finite numbers"):
+        vanishing_line(LEVEL, normal)

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from bag_graph import Graph, new_graph, write_drive
+from bag_graph import IMAGE, Graph, new_graph, write_drive
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
@@ -17,6 +19,8 @@ from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
 from robot_vision.bags import BagReader, BagWriter, messages
+
+STEERING = "geometry_msgs/msg/TwistStamped"
 
 
 @pytest.fixture
@@ -182,3 +186,63 @@ def test_what_cannot_be_replayed_ends_with_one_line(
     graph.until(lambda: player.poll() is not None, "the end")
     said = player.stderr.read()
     assert player.returncode in (1, 2) and words in said and "Traceback" not in said
+
+
+def test_an_answer_that_stands_in_the_bag_answers_nothing(graph: Graph, tmp_path: Path) -> None:
+    bag = tmp_path / "a.mcap"
+    with BagWriter(bag) as made:
+        for stamp in (10**9, 2 * 10**9):
+            made.write("/image", IMAGE, stamp, messages.image(stamp, "camera", np.zeros((4, 4), np.uint8)))
+            made.write("/steering", STEERING, stamp, messages.twist_stamped(stamp, "base_link", 1.0, 0.0))
+    graph.hear("image", Image)
+    steering = graph.hear("steering", TwistStamped)
+    player = graph.start("bag_player", bag=bag, lockstep="steering", lockstep_timeout=0.2, wait_timeout=1.0)
+    said = graph.ended(player)
+    assert "/steering is left out" in said and "0 answered, 2 without an answer" in said
+    assert not steering
+
+
+def test_who_publishes_the_same_is_named(graph: Graph, tmp_path: Path) -> None:
+    graph.hear("image", Image)
+    graph.node.create_publisher(Odometry, "odom", 10)
+    player = graph.start("bag_player", bag=write_drive(tmp_path / "a.mcap", 2))
+    assert "others publish /odom too" in graph.ended(player)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"topics": "image"}, "topics must be a list of texts"),
+        ({"wait_for_nodes": "[1, 2]"}, "wait_for_nodes must be a list of texts"),
+        ({"lockstep": "'a b'"}, "lockstep must hold names of topics, not 'a b'"),
+        ({"start": 1000.0}, "start lies at 1000 s"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_refused_in_one_line(
+    graph: Graph, tmp_path: Path, parameters: dict[str, Any], words: str
+) -> None:
+    player = graph.start("bag_player", bag=write_drive(tmp_path / "a.mcap", 2), **parameters)
+    graph.until(lambda: player.poll() is not None, "the refusal")
+    said = player.stderr.read()
+    assert player.returncode in (1, 2) and words in said and "Traceback" not in said
+
+
+def test_nodes_are_awaited_in_the_namespace_of_the_player(graph: Graph, tmp_path: Path) -> None:
+    publisher = graph.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    images = graph.hear("/front/image", Image)
+    player = graph.start(
+        "bag_player",
+        "-r",
+        "__ns:=/front",
+        bag=write_drive(tmp_path / "a.mcap", 2),
+        wait_for_nodes="[line_detector]",
+        wait_timeout=3600.0,
+    )
+
+    def say_ready() -> bool:
+        status = DiagnosticStatus(name="/front/line_detector", values=[KeyValue(key="ready", value="true")])
+        publisher.publish(DiagnosticArray(status=[status]))
+        return len(images) == 2
+
+    graph.until(say_ready, "the pictures")
+    graph.ended(player)

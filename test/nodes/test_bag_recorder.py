@@ -132,3 +132,11 @@ def test_a_recording_is_not_overwritten_unless_asked(graph: Graph, tmp_path: Pat
     graph.until(lambda: count_in(out) == 1, "the new recording")
     graph.interrupt(recorder)
     assert BagReader(out).message_count == 1
+
+
+def test_a_name_that_is_none_is_refused_in_one_line(graph: Graph, tmp_path: Path) -> None:
+    recorder = graph.start("bag_recorder", output=tmp_path / "out.mcap", topics="['bad name']")
+    graph.until(lambda: recorder.poll() is not None, "the refusal")
+    said = recorder.stderr.read()
+    assert recorder.returncode == 2 and "topics must hold names of topics, not 'bad name'" in said
+    assert "Traceback" not in said

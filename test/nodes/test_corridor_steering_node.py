@@ -6,15 +6,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
+from nav_msgs.msg import Path
 from node_bench import NodeBench
-from sensor_msgs.msg import Range
+from sensor_msgs.msg import Imu, Range
 from std_srvs.srv import SetBool
 
 from robot_vision.control import CorridorSteering
+from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.lane import LaneHeading
-from robot_vision.ros.messages import heading_to_message
+from robot_vision.ros.messages import attitude_to_message, heading_to_message, path_to_message
 from robot_vision.ros.node import stamp_ns
 
 SPEED = 0.6
@@ -26,6 +29,8 @@ def bench(ros_domain: int) -> Iterator[NodeBench]:
     try:
         bench.speaks(PoseWithCovarianceStamped, "heading")
         bench.speaks(Range, "clearance")
+        bench.speaks(Path, "path_ahead")
+        bench.speaks(Imu, "attitude")
         bench.hears(TwistStamped, "steering")
         bench.connect()
         yield bench
@@ -207,3 +212,46 @@ def test_a_clock_that_jumps_back_gets_a_line_and_steering_goes_on(bench: NodeBen
     start_anew(bench)
     steer(bench, lane_at())
     bench.log_line("/heading", "went back")
+
+
+def test_on_a_road_it_waits_for_the_path_of_the_picture_and_follows_it(bench: NodeBench) -> None:
+    start_anew(bench)
+    steer(bench, lane_at())
+    for _ in range(10):
+        header = bench.header()
+        bench.say_surely("heading", heading_to_message(header, lane_at(), "road"))
+        assert not any(said.header.stamp == header.stamp for said in bench.said("steering"))
+        bench.say_surely("path_ahead", path_to_message(header, [(x, 0.05 * x * x) for x in range(6)]))
+        said = bench.answer("steering", header)
+    assert said.twist.angular.z > 0.01  # the road bends to the left, though the robot heads along it
+    broken = path_to_message(bench.header(), [(0.0, 0.0), (math.nan, 0.0)])
+    bench.say_surely("path_ahead", broken)
+    bench.log_line("/path_ahead", "point 1 of the path")
+    steer(bench, lane_at())
+
+
+def lean(bench: NodeBench, roll: float, pitch: float) -> None:
+    attitude = Attitude.from_angles(roll, pitch, 1e-6 * np.eye(2))
+    bench.say_surely("attitude", attitude_to_message(bench.header(), attitude))
+
+
+def test_a_robot_that_leans_slows_and_says_so(bench: NodeBench) -> None:
+    assert bench.set_parameter("mind_lean", True).successful
+    assert bench.set_parameter("camera.pitch", 0.3).successful
+    start_anew(bench)
+    for _ in range(40):
+        lean(bench, 0.0, 0.3)  # the camera as it is mounted
+        upright = steer(bench, lane_at())
+    assert upright.twist.linear.x > 0.4
+    for _ in range(40):
+        lean(bench, 0.4, 0.3)
+        leaning = steer(bench, lane_at())
+    assert leaning.twist.linear.x == pytest.approx(0.0, abs=1e-6)
+    bench.until(lambda: "tip over" in bench.state("message"), "it says why")
+    broken = attitude_to_message(bench.header(), Attitude.from_angles(0.0, 0.3, 1e-6 * np.eye(2)))
+    broken.orientation_covariance[0] = -1.0
+    bench.say_surely("attitude", broken)
+    bench.log_line("/attitude", "absent")
+    assert bench.set_parameter("mind_lean", False).successful
+    assert bench.set_parameter("camera.pitch", 0.0).successful
+    assert steer(bench, lane_at()).twist.linear.x > 0.0

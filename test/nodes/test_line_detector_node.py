@@ -73,7 +73,7 @@ def test_without_calibration_it_finds_lines_and_says_what_is_missing(bench: Node
 def test_a_picture_without_lines_is_answered_by_an_empty_cloud(bench: NodeBench) -> None:
     cloud = show(bench, np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
     assert (cloud.width, len(cloud.data)) == (0, 0)
-    assert [field.name for field in cloud.fields] == ["x1", "y1", "x2", "y2", "strength", "sigma"]
+    assert [field.name for field in cloud.fields] == ["x1", "y1", "x2", "y2", "strength"]
 
 
 BAD_PICTURES = {
@@ -142,6 +142,9 @@ def test_an_impossible_setting_is_refused_live_with_the_reason(bench: NodeBench)
     refused = bench.set_parameter("edge_contrast", 200.0)
     assert not refused.successful
     assert "must not exceed contrast" in refused.reason
+    refused = bench.set_parameter("method", "guess")
+    assert not refused.successful
+    assert "trace, hough" in refused.reason
     refused = bench.set_parameter("min_length", -1.0)
     assert not refused.successful
     assert_edge_found(show(bench, half_bright()))

@@ -33,7 +33,7 @@ from robot_vision.perception import (
     Role,
     VanishingPointEstimator,
 )
-from robot_vision.perception.odometry import TurnRateHistory
+from robot_vision.perception.odometry import RateHistory
 
 Set = TypeVar("Set")
 
@@ -136,7 +136,7 @@ Followed = list[tuple[int, HeadingEstimate]]
 @pytest.fixture(scope="module", params=[True, False], ids=["odometry", "alone"])
 def corridor(request: pytest.FixtureRequest) -> tuple[Followed, dict[int, tuple[float, float]]]:
     """Answers of the recorded corridor by stamp, and the truth: yaw (rad) and offset (m)."""
-    detector, estimator, rates = LineDetector(), HeadingEstimator(), TurnRateHistory()
+    detector, estimator, rates = LineDetector(), HeadingEstimator(), RateHistory()
     camera: Camera | None = None
     truth: dict[int, tuple[float, float]] = {}
     answers: Followed = []

@@ -17,7 +17,8 @@ SPEED = Setting("speed", 0.5, "m/s", 0.1, 2.0)
 COUNT = Setting("count", 3, "lines", 1, 10)
 METHOD = Setting("method", "trace", "how", choices=("trace", "hough"))
 ON = Setting("on", True, "whether")
-ALL = (SPEED, COUNT, METHOD, ON)
+NAMES = Setting("names", [""], "of topics")
+ALL = (SPEED, COUNT, METHOD, ON, NAMES)
 
 
 @given(st.floats(allow_nan=True, allow_infinity=True))
@@ -42,6 +43,9 @@ def test_a_number_is_accepted_exactly_within_its_range(value: float) -> None:
         (METHOD, 1),
         (ON, 1),
         (ON, "true"),
+        (NAMES, "image"),
+        (NAMES, 3),
+        (NAMES, None),
     ],
 )
 def test_a_wrong_type_or_choice_is_refused_by_name_and_value(setting: Setting, value: Any) -> None:

@@ -24,7 +24,7 @@ PRIOR_SIGMA = 0.35
 #: Support that one squared standard deviation of the prior outweighs, in mean lines.
 _PRIOR_PRICE = 6.0
 #: Lines share their errors, and no scene is quite rectangular: factor on the standard deviation, from real towns.
-_SHARED_ERROR = 4.5
+SHARED_ERROR = 4.5
 _FRAMES_A_RATIO = 2
 
 
@@ -79,5 +79,5 @@ def _refit(bundle: Bundle, frame: Array, ratio: float, rounds: int = 12) -> tupl
     ratio, information, support = focal_kernels.turn_frame_and_stretch(
         *bundle.arrays, turned, ratio, stiffness, TOLERANCE, rounds
     )
-    sigma = min(_SHARED_ERROR / float(np.sqrt(information)), PRIOR_SIGMA)
+    sigma = min(SHARED_ERROR / float(np.sqrt(information)), PRIOR_SIGMA)
     return float(support) - _price(ratio), FocalLength(float(ratio), sigma, turned)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Straight lines by Hough transform, each then refitted to the gradient that supports it: what tracing is held against.
+"""Straight lines by Hough transform, each then refitted to the gradient that supports it.
 
 The probabilistic Hough transform (Matas et al. 2000) places a line to about a pixel and a degree, because its cells
 are that large. The refit measures, at many places along a line, where across it the gradient has its crest, and fits
@@ -7,8 +7,6 @@ a line through those crests: three times as many vanishing points come out withi
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -40,11 +38,11 @@ class HoughFinder:
 
     def __init__(
         self,
-        blur: float = 0.8,
-        levels: Sequence[tuple[float, float]] = ((18.0, 6.0), (8.0, 2.7)),
-        enough: int = 120,
-        min_length: float = 20.0,
-        max_gap: int = 3,
+        blur: float,
+        levels: list[tuple[float, float]],
+        enough: int,
+        min_length: float,
+        max_gap: int,
         votes: int = 30,
     ) -> None:
         self._blur = blur

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the floor before the robot ends, column by column: its continuity, examined in the picture itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.mapping.ground_view import GroundView
+
+Array = NDArray[np.float64]
+Scores = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The end of the floor in each column of the working picture.
+
+    Attributes:
+        rows: (W,) row at which floor ends: what lies below is floor without a gap.
+        ended: (W,) whether something stands there; else the floor goes on as far as can be told.
+        distance: (W,) of the end, m from the camera over the floor.
+        x, y: (W,) of the end, m in base_link.
+    """
+
+    rows: Array
+    ended: NDArray[np.bool_]
+    distance: Array
+    x: Array
+    y: Array
+
+    @classmethod
+    def at(cls, rows: Array, ended: NDArray[np.bool_], view: GroundView) -> Boundary:
+        """The boundary at given rows (W,)."""
+        x, y = view.ground(np.arange(len(rows), dtype=np.float64), rows)
+        return cls(rows, ended, np.hypot(x - view.camera.x_m, y), x, y)
+
+
+@dataclass(frozen=True)
+class BoundaryFinder:
+    """Goes up each column from the bottom until what it meets is no floor over the height of a least object.
+
+    Args:
+        least_height: of a thing worth the name, m; by (20.1) it covers y h / H rows at y rows below the horizon.
+        least_rows: fewer rows than this are noise wherever they lie, px.
+        covered: share of the ground's rows which, without floor from the bottom of the picture on, need no edge.
+        doubt: mean score below which those rows are no floor.
+        median: columns over which a single one is outvoted; insignificant inconsistencies are 3 to 5 px.
+        snake: rows by which the boundary may move to the edge it belongs to, px of the working picture.
+        stiffness: cost of a bend of the boundary, as share of the strongest edge a row.
+    """
+
+    least_height: float = 0.07
+    least_rows: int = 3
+    covered: float = 0.25
+    doubt: float = 0.2
+    median: int = 5
+    snake: int = 3
+    stiffness: float = 0.12
+
+    def find(
+        self, score: Scores, hard: Mask, gray: NDArray[np.uint8], view: GroundView, reach: float
+    ) -> Boundary:
+        """Find the boundary.
+
+        Args:
+            score: (H - view.top, W) positive for floor.
+            hard: (H - view.top, W) where an edge is near that a thing on the floor would have.
+            gray: (H, W) the working picture, for the edge at the end of the floor.
+            view: of the ground in it.
+            reach: how far it is looked, m.
+        """
+        rows, columns = view.shape
+        top = view.top
+        last = self._last_rows(view, reach)
+        first = self._first_gap(score, hard, view)
+        ended = first >= last
+        place = np.where(ended, first, last).astype(np.float64)
+        place = _median(place, self.median)
+        ended = place >= last + 0.5
+        moved = self._snap(place, gray, top)
+        place = np.where(ended, np.maximum(moved, last), place)
+        return Boundary.at(np.clip(place, top, rows - 1.0), ended, view)
+
+    def _last_rows(self, view: GroundView, reach: float) -> Array:
+        """Row (W,) of the floor at `reach` straight away from the camera in each column."""
+        # Planes at one distance ahead are close enough to circles here; the plan measures exactly.
+        columns = np.arange(view.shape[1], dtype=np.float64)
+        rows = np.full(view.shape[1], float(view.shape[0] - 1))
+        x0, y0 = view.ground(columns, rows)
+        toward = np.arctan2(y0, x0 - view.camera.x_m)
+        _, v = view.pixels(view.camera.x_m + reach * np.cos(toward), reach * np.sin(toward))
+        return np.asarray(np.clip(v, view.top, view.shape[0] - 1))
+
+    def _first_gap(self, score: Scores, hard: Mask, view: GroundView) -> NDArray[np.int64]:
+        """Lowest row (W,) from which on upwards no floor is seen; the row above the part when there is none."""
+        height, top = len(score), view.top
+        below = np.arange(top, top + height) - float(view.horizon_rows.mean())
+        tall = self.least_height / (view.camera.height_m or 1.0)
+        need = np.clip(np.round(below * tall), self.least_rows, 12).astype(int)
+        need = np.minimum(need, np.arange(1, height + 1))
+        total = np.zeros((height + 1, score.shape[1]), np.float32)
+        np.cumsum(score, axis=0, out=total[1:])
+        index = np.arange(height)
+        window = (total[index + 1] - total[index + 1 - need]) / need[:, None]
+        gap = (window < self.doubt) & (score < self.doubt) & (hard | self._from_below(score))
+        gap[: self.least_rows] = False
+        lowest = height - 1 - np.argmax(gap[::-1], axis=0)
+        return np.where(gap.any(axis=0), top + lowest, top - 1)
+
+    def _from_below(self, score: Scores) -> Mask:
+        """The lowest rows (H, W) of columns that begin without floor: the foot of what stands there is below them.
+
+        What is shorter than that is the glare of a lamp.
+        """
+        height = len(score)
+        part = max(round(self.covered * height), 1)
+        bare = (score[height - part :] < self.doubt).all(axis=0)
+        rows = np.zeros(score.shape, bool)
+        rows[height - part :, bare] = True
+        return rows
+
+    def _snap(self, place: Array, gray: NDArray[np.uint8], top: int) -> Array:
+        """Move the boundary to the edge near it as one line: an active contour solved by dynamic programming.
+
+        Amini, Weymouth and Jain 1990, one step a column: the sum of edge strength and cost of bends is least.
+        """
+        reach = self.snake
+        edge = np.asarray(np.abs(cv2.Scharr(gray, cv2.CV_32F, 0, 1)) / 32.0, np.float32)
+        offsets = np.arange(-reach, reach + 1)
+        base = np.round(place).astype(int)
+        rows = np.clip(base[:, None] + offsets, top + 1, gray.shape[0] - 2)
+        columns = np.arange(len(place))[:, None]
+        strength = edge[rows, columns]
+        cost = -np.minimum(strength, 12.0) / 12.0 + 0.03 * np.abs(offsets)
+        bend = self.stiffness * np.abs(offsets[:, None] - offsets[None, :]).astype(np.float32)
+        best = np.empty(cost.shape, np.float32)
+        came = np.zeros(cost.shape, np.int64)
+        best[0] = cost[0]
+        jumps = np.diff(base)
+        for k in range(1, len(place)):
+            if abs(jumps[k - 1]) > 2 * reach:  # another thing begins: nothing holds the two ends together
+                best[k] = cost[k] + best[k - 1].min()
+                came[k] = int(best[k - 1].argmin())
+                continue
+            step = best[k - 1][None, :] + bend
+            came[k] = step.argmin(axis=1)
+            best[k] = cost[k] + step[np.arange(len(offsets)), came[k]]
+        chosen = np.zeros(len(place), int)
+        chosen[-1] = int(best[-1].argmin())
+        for k in range(len(place) - 1, 0, -1):
+            chosen[k - 1] = came[k, chosen[k]]
+        moved = rows[np.arange(len(place)), chosen]
+        return self._subpixel(edge, moved)
+
+    @staticmethod
+    def _subpixel(edge: Scores, rows: NDArray[np.int64]) -> Array:
+        """Vertex of the parabola through the edge strengths about each row."""
+        columns = np.arange(len(rows))
+        low, mid, high = (edge[rows + d, columns].astype(np.float64) for d in (-1, 0, 1))
+        curve = low - 2.0 * mid + high
+        shift = np.where(curve < -1e-3, 0.5 * (low - high) / np.minimum(curve, -1e-3), 0.0)
+        return np.asarray(rows + np.clip(shift, -0.5, 0.5))
+
+
+def _median(values: Array, width: int) -> Array:
+    """Running median of an odd width."""
+    if width < 3:
+        return values
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))

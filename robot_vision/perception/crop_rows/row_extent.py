@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where rows begin, have gaps and end: what stands along the way, gathered over all pictures that showed it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CELL_M = 0.25
+"""Length of a stretch of way, m."""
+_CELLS, _BEHIND = 200, 60
+"""Stretches remembered, and how many of them behind the robot."""
+_KNOWN = 0.25
+"""A stretch that was looked at for less says nothing."""
+_WEIGHTS = np.array([0.25, 0.5, 0.25])
+_OPEN = 0.15
+"""Share of the usual cover that open ground has at most, all in all."""
+_TAIL = 3
+"""So many stretches of open ground may still hold the last plants of rows."""
+_NEAR_M, _ENOUGH = 3.0, 6
+"""Ground before the robot, and stretches of it, that tell what is usual."""
+_FARTHEST = 0.15
+"""A stretch seen from nearer counts for more; the farthest ones for this much."""
+
+
+@dataclass
+class RowExtent:
+    """Keeps how much of each stretch of the way is covered by rows, in the robot's own metres of way.
+
+    What grows in rows counts for its row and against it between rows, so weeds and grass cancel and are no row.
+
+    Args:
+        gap: longest piece of the field without plants, m: rows that do not go on behind so much open ground
+            have ended.
+        sparse: share of the usual cover below which a stretch is open.
+
+    Raises:
+        ValueError: naming the setting that makes no sense.
+    """
+
+    gap: float = 4.0
+    sparse: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.gap) and self.gap >= 2 * CELL_M):
+            raise ValueError(f"gap must be at least {2 * CELL_M:g} m, not {self.gap}")
+        if not 0.0 < self.sparse < 1.0:
+            raise ValueError(f"sparse must lie in (0, 1), not {self.sparse}")
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the way so far."""
+        self._cover = np.zeros(_CELLS)
+        self._seen = np.zeros(_CELLS)
+        self._origin = -_BEHIND
+
+    def see(self, way: float, ahead: Array, cover: Array, seen: Array) -> None:
+        """Take in a picture.
+
+        Args:
+            way: metres the robot has gone.
+            ahead: (N,) distance of stretches ahead of the robot, m.
+            cover: (N,) share of their ground that rows cover, from -1 to 1.
+            seen: (N,) how much this picture can tell of each, 0 to 1.
+        """
+        gone = min(int(np.floor(way / CELL_M)) - _BEHIND - self._origin, _CELLS)
+        if gone > 0:
+            for kept in (self._cover, self._seen):
+                kept[: _CELLS - gone] = kept[gone:]
+                kept[_CELLS - gone :] = 0.0
+            self._origin += gone
+        place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
+        good = (place >= 0) & (place < _CELLS)
+        np.add.at(self._cover, place[good], seen[good] * cover[good])
+        np.add.at(self._seen, place[good], seen[good])
+
+    def is_open(self, way: float, ahead: Array) -> NDArray[np.bool_]:
+        """Whether places so far ahead of the robot (N,), m, are known to be open ground: what grows there is weed."""
+        known = self._seen > _KNOWN
+        if not known.any():
+            return np.zeros(len(ahead), np.bool_)
+        cover = self._mean_cover(known)
+        bare = known & (cover < self.sparse * self._usual(cover, known, way))
+        place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
+        return np.asarray(bare[np.clip(place, 0, _CELLS - 1)])
+
+    def end(self, way: float) -> float | None:
+        """Metres from the robot to where the rows end, negative behind it; None: no end is known.
+
+        It is before the first ground that was looked at all along, is as long as no gap may be, and on which next to
+        nothing stands in rows. What grows behind that, such as the grass of a meadow, is of no account.
+        """
+        known = self._seen > _KNOWN
+        if not known.any():
+            return None
+        # Single plants are missing everywhere: neighbours are looked at together
+        cover = np.convolve(
+            np.where(known, self._cover / np.maximum(self._seen, 1e-9), 0.0), _WEIGHTS, "same"
+        )
+        usual = self._usual(cover, known, way)
+        stands = np.flatnonzero(known & (cover > self.sparse * usual))
+        length = int(np.ceil(self.gap / CELL_M))
+        if not len(stands) or stands[0] + length + 1 >= _CELLS:
+            return None
+        begins = np.arange(stands[0] + 1, _CELLS - length)
+        looked_at = np.concatenate([[0], np.cumsum(known)])
+        covered = np.concatenate([[0.0], np.cumsum(cover)])
+        is_open = looked_at[begins + length] - looked_at[begins] == length
+        is_open &= covered[begins + length] - covered[begins] < _OPEN * usual * length
+        if not is_open.any():
+            return None
+        first = int(begins[is_open.argmax()])
+        last = int(stands[stands < first + _TAIL].max())
+        return float((self._origin + last + 1) * CELL_M - way)
+
+    def _mean_cover(self, known: NDArray[np.bool_]) -> Array:
+        """Cover of each stretch: neighbours together, as single plants are missing everywhere."""
+        cover = np.where(known, self._cover / np.maximum(self._seen, 1e-9), 0.0)
+        return np.asarray(np.convolve(cover, _WEIGHTS, "same"))
+
+    def _usual(self, cover: Array, known: NDArray[np.bool_], way: float) -> float:
+        """Cover of a stretch on which plants stand, by those near the robot where there are enough."""
+        here = int(np.floor((way + _NEAR_M) / CELL_M)) - self._origin
+        near = known & (np.arange(_CELLS) < here)
+        told = cover[near if near.sum() > _ENOUGH else known]
+        return max(float(np.quantile(told, 0.85)), 1e-3)
+
+
+def row_cover(
+    x: Array, aside: Array, area: Array, spacing: float, half_width: float, near: float, far: float
+) -> tuple[Array, Array, Array]:
+    """Cover of the ground by rows, stretch by stretch ahead.
+
+    Args:
+        x: (N,) of bits of vegetation ahead of the robot, m.
+        aside: (N,) of them to the left of the robot's row, m.
+        area: (N,) of ground that each covers, m^2.
+        spacing: between rows, m.
+        half_width: ground to either side of the robot's row that counts, m.
+        near: where the ground in view begins, m.
+        far: where it ends, m.
+
+    Returns:
+        Distance ahead (m), cover (-1 to 1) and weight (0 to 1) of each stretch, (S,) each.
+    """
+    edges = np.arange(np.ceil(near / CELL_M), np.floor(far / CELL_M) + 0.5) * CELL_M
+    middles = 0.5 * (edges[:-1] + edges[1:])
+    inside = np.abs(aside) < half_width
+    votes = area[inside] * np.cos(2.0 * np.pi * aside[inside] / spacing)
+    summed, _ = np.histogram(x[inside], edges, weights=votes)
+    weight = np.clip(1.5 - middles / far, _FARTHEST, 1.0)
+    return middles, summed / (2.0 * half_width * CELL_M), weight

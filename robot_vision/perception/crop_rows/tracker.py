@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From successive pictures to the robot's place among the rows: one object, one verb."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry import Camera
+from robot_vision.perception.crop_rows.detector import CropRowDetector
+from robot_vision.perception.crop_rows.ground_fit import (
+    HEIGHT,
+    OFFSET,
+    YAW,
+    Curvature,
+    GroundFit,
+    Pieces,
+    RowsOnGround,
+    ground_places,
+    lateral,
+    nearest_row,
+    pieces_of,
+    tall_by_cover,
+)
+from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, row_cover
+from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
+from robot_vision.perception.crop_rows.sight import fault_of
+from robot_vision.perception.crop_rows.start import start_on_ground
+from robot_vision.perception.lane import LaneHeading
+from robot_vision.perception.vegetation import Picture, VegetationMask
+
+Array = NDArray[np.float64]
+
+_CELL_PX = 8
+#: Share of the ground covered from which on the bare ground between the rows is the rarer and tells more.
+_CLOSED = 0.4
+#: Length of a stretch of way (m), the farthest one, and the share of it that must be grown over to be of use.
+_STRETCH_M, _FARTHEST_M, _GROWN = 0.5, 40.0, 0.4
+#: Height and spacing contradict each other beyond this share and twice what plants may be high: one is not as given.
+_CONTRADICTION = 0.05
+#: Without odometry, after so many pictures in a row that fit no row the search begins anew.
+_MOST_REFUSED = 8
+#: Standard deviation of the offset, in spacings, beyond which nobody knows which row this is.
+_LOST = 0.2
+#: Rows to either side of the robot's own that tell where rows end.
+_SIDE_ROWS = 2.5
+
+
+@dataclass(frozen=True)
+class RowEstimate:
+    """What one picture adds to the knowledge of the way along the rows.
+
+    Attributes:
+        lane: the robot in its row, curvature included; None while it is not known, or not seen any more.
+        reason: in plain words why there is no lane, or what is wrong with it; empty when all is well.
+        seen: whether this picture shows the rows; else `lane` is carried on by odometry.
+        rows: as this picture alone has them; None where it does not.
+        end: metres from the robot to where the rows end; None while no end is in sight.
+    """
+
+    lane: LaneHeading | None
+    reason: str
+    seen: bool
+    rows: RowsOnGround | None
+    end: float | None
+
+
+@dataclass
+class RowTracker:
+    """Follows the row the robot stands over through successive pictures.
+
+    Args:
+        spacing: between rows, m.
+        mask: of vegetation.
+        detector: that finds rows where nothing is known yet; its camera and spacing are of no account.
+        fit: of the rows on the ground.
+        row_filter: over time.
+        extent: of the rows along the way.
+        coherence: least share of the vegetation that must stand in rows, 0 to 1.
+        cover: least share of the ground that plants must cover.
+
+    Raises:
+        ValueError: naming the setting that makes no sense.
+    """
+
+    spacing: float
+    mask: VegetationMask = field(default_factory=VegetationMask)
+    detector: CropRowDetector = field(default_factory=CropRowDetector)
+    fit: GroundFit = field(default_factory=GroundFit)
+    row_filter: RowFilter = field(default_factory=RowFilter)
+    extent: RowExtent = field(default_factory=RowExtent)
+    coherence: float = 0.12
+    cover: float = 0.004
+    _way: float = field(default=0.0, init=False, repr=False, compare=False)
+    _refused: int = field(default=0, init=False, repr=False, compare=False)
+    _unseen: float = field(default=0.0, init=False, repr=False, compare=False)
+    _blind: bool = field(default=False, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.spacing) and self.spacing > 0.0):
+            raise ValueError(f"spacing must be a positive number of metres, not {self.spacing}")
+        for name in ("coherence", "cover"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ValueError(f"{name} must lie in [0, 1), not {getattr(self, name)}")
+
+    def reset(self) -> None:
+        """Forget everything earlier pictures told."""
+        self.row_filter.reset()
+        self.extent.reset()
+        self._way = self._unseen = 0.0
+        self._refused = 0
+
+    def update(self, picture: Picture, camera: Camera, motion: Motion) -> RowEstimate:
+        """Take in the next picture.
+
+        Args:
+            picture: rectified, uint8 (H, W, 3) BGR, or (H, W) in the near infrared.
+            camera: with its place on the robot, of the picture's size; its height must be known.
+            motion: since the picture before.
+
+        Raises:
+            ValueError: the camera has no height, or the array is no picture.
+        """
+        camera = camera.rectified()
+        if camera.height_m is None or not camera.focal_known:
+            raise ValueError(
+                "rows in metres need a calibrated camera and its height (parameter camera.height)"
+            )
+        self.row_filter.predict(motion)
+        self._blind = motion.speed is None
+        self._way += (motion.speed or 0.0) * motion.seconds
+        self._unseen += abs(motion.speed or 0.0) * motion.seconds
+        fault = fault_of(picture)
+        if fault:
+            # Odometry alone may carry on over ground that was looked at and is bare, not through the dark
+            return replace(self._without(fault), lane=None)
+        mask = self.mask.of(picture)
+        cell = _CELL_PX * max(1, picture.shape[1] // 640)
+        pieces = pieces_of(mask, camera, cell)
+        covered = self._covered(pieces, camera)
+        told = (
+            pieces
+            if covered < _CLOSED
+            else between_plants(pieces_of(~mask, camera, cell, 0.5), pieces, camera)
+        )
+        if self.row_filter.knows:
+            told = self._where_rows_stand(told, camera)
+        rows, fault = self._fitted(picture, told, covered, camera)
+        if rows is None:
+            if self.row_filter.knows:
+                self._look_along(pieces, camera, self._start(), motion)
+            return self._without(fault)
+        expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
+        rows = nearest_row(rows, expected)
+        if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3]):
+            self._look_along(pieces, camera, self._start(), motion)
+            return self._without("what stands in this picture does not go on from the rows before")
+        self._refused = 0
+        self._unseen = 0.0
+        self._look_along(pieces, camera, rows.values, motion)
+        return RowEstimate(self._lane(), "", True, rows, self.extent.end(self._way))
+
+    def _start(self) -> Array:
+        """What a picture should show, (6,): as predicted, the body upright."""
+        return np.array([*self.row_filter.expected(), 0.0, 0.0, -0.02])
+
+    def _where_rows_stand(self, pieces: Pieces, camera: Camera) -> Pieces:
+        """Leave out what grows in known gaps and where the rows are over: weeds, and the grass of the headland."""
+        x, _ = ground_places(pieces.rays, camera, self._start())
+        here = ~self.extent.is_open(self._way, x)
+        end = self.extent.end(self._way)
+        if end is not None:
+            here &= x < end + CELL_M
+        return Pieces(pieces.rays[here], pieces.weight[here], pieces.aside)
+
+    def _covered(self, pieces: Pieces, camera: Camera) -> float:
+        """Share of the ground that plants cover, straight before the robot."""
+        upright = np.zeros(6)
+        x, y = ground_places(pieces.rays, camera, upright)
+        near, far = ground_in_view(camera, upright)
+        far = min(far, 0.5 * self.fit.far)
+        half = _SIDE_ROWS * self.spacing
+        here = (x > near) & (x < far) & (np.abs(y) < half)
+        return float(pieces.weight[here].sum()) / max(2.0 * half * (far - near), 1e-6)
+
+    def _fitted(
+        self, picture: Picture, pieces: Pieces, covered: float, camera: Camera
+    ) -> tuple[RowsOnGround | None, str]:
+        """Rows of this picture alone, or the reason why there are none."""
+        if covered < self.cover:
+            return None, "hardly anything grows in this picture"
+        if self.row_filter.knows:
+            start = self._start()
+            curvature = float(start[2])
+            sigma = float(np.sqrt(self.row_filter.covariance[2, 2]))
+            bend = Curvature(curvature, float(np.clip(sigma, 5e-4, 0.015)))
+        else:
+            pattern = self.detector.detect(picture)
+            if pattern is None:
+                return None, "no rows stand out in this picture"
+            start, bend = start_on_ground(pattern, camera, self.spacing), Curvature()
+        rows = self.fit.fit(pieces, camera, self.spacing, start, bend, tall_by_cover(covered))
+        if rows is None:
+            return None, "hardly anything grows before the robot"
+        if rows.share < self.coherence:
+            return None, "what grows in this picture does not stand in rows"
+        stretch = float(np.exp(rows.values[HEIGHT] - tall_by_cover(covered)[0]))
+        if abs(np.log(stretch)) > _CONTRADICTION + 2.0 * tall_by_cover(covered)[1]:
+            return None, (
+                f"rows stand {self.spacing / stretch:.2f} m apart for a camera {camera.height_m:g} m up, "
+                f"not {self.spacing:g} m: look at spacing, camera.height and camera.pitch"
+            )
+        if max(np.abs(rows.values[3:5])) > 4.0 * self.fit.lean:
+            return None, "the rows lie as if the camera had been knocked over: look at camera.pitch and roll"
+        return rows, ""
+
+    def _look_along(self, pieces: Pieces, camera: Camera, values: Array, motion: Motion) -> None:
+        """Note where along the way rows stand."""
+        if motion.speed is None:
+            self.extent.reset()  # without odometry nobody knows where the last picture was taken
+        x, y = ground_places(pieces.rays, camera, values)
+        aside, along = lateral(x, y, values)
+        near, far = ground_in_view(camera, values)
+        half = _SIDE_ROWS * self.spacing
+        stretch = row_cover(
+            along, aside, pieces.weight, self.spacing, half, near, min(far, 1.4 * self.fit.far)
+        )
+        self.extent.see(self._way, *stretch)
+
+    def _lane(self) -> LaneHeading | None:
+        state, covariance = self.row_filter.state, self.row_filter.covariance
+        if np.sqrt(covariance[OFFSET, OFFSET]) > _LOST * self.spacing:
+            return None
+        return LaneHeading(
+            float(state[YAW]),
+            float(covariance[YAW, YAW]),
+            float(state[OFFSET]),
+            float(covariance[OFFSET, OFFSET]),
+            self.spacing,
+            float(state[2]),
+        )
+
+    def _without(self, reason: str) -> RowEstimate:
+        """The answer to a picture that shows no rows: odometry carries on, as far as a gap may be long."""
+        if not self.row_filter.knows:
+            return RowEstimate(None, reason, False, None, None)
+        self._refused += 1
+        end = self.extent.end(self._way)
+        lane = self._lane()
+        lost = self._unseen > self.extent.gap or (self._blind and self._refused > _MOST_REFUSED)
+        if lane is None or lost:
+            self.reset()
+            return RowEstimate(None, f"{reason}; the row is lost", False, None, end)
+        return RowEstimate(lane, reason, False, None, end)
+
+
+def between_plants(bare: Pieces, plants: Pieces, camera: Camera) -> Pieces:
+    """The bits of bare ground in stretches of the way where plants stand: not those of gaps and the headland."""
+    upright = np.zeros(6)
+    ahead = [
+        np.clip(ground_places(bits.rays, camera, upright)[0], 0.0, _FARTHEST_M) for bits in (bare, plants)
+    ]
+    stretch = [(x / _STRETCH_M).astype(np.int64) for x in ahead]
+    count = int(_FARTHEST_M / _STRETCH_M) + 1
+    open_area, grown = (
+        np.bincount(place, bits.weight, count) for place, bits in zip(stretch, (bare, plants), strict=True)
+    )
+    kept = (grown > _GROWN * (open_area + grown))[stretch[0]]
+    return Pieces(bare.rays[kept], bare.weight[kept], bare.aside)
+
+
+def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
+    """Nearest and farthest ground (m ahead of base_link) in the middle column of a picture."""
+    middle = 0.5 * (camera.width - 1.0)
+    rays = camera.rays([[middle, camera.height - 1.0], [middle, 0.0]]) @ camera.optical_to_base.T
+    x, _ = ground_places(rays, camera, values)
+    far = float(x[1]) if 0.0 < x[1] < 100.0 else 100.0
+    return float(x[0]), far
