@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.report import Cell, Row, Table, at_most
 from bench.sources import CORRIDOR, MissingSetError, YorkPicture, york_urban
-from bench.york import Find, lsd
+from bench.york import Find, hough, lsd
 from robot_vision.bags import BagReader, decode
 from robot_vision.bags.messages import picture
 from robot_vision.geometry import Camera
@@ -40,7 +40,7 @@ def run(quick: bool) -> list[Table]:
     trace.warm_up()
     ways: dict[str, Find] = {
         "trace": trace.detect,
-        "hough": LineDetector(method="hough").detect,
+        "hough": hough().detect,
         "OpenCV LSD": lsd(),
     }
     spent = {name: np.zeros((ROUNDS, len(pictures))) for name in ways}
