@@ -118,6 +118,6 @@ def run(quick: bool) -> list[Table]:
             title,
             ["maze_planner's library"],
             rows,
-            ["the vehicle has 84 mm to either side, and is 81 mm wide"],
+            ["the floor between two walls is 168 mm wide, the vehicle 81 mm"],
         )
     ]
