@@ -64,7 +64,7 @@ class RowTracer:
     blur: float = 0.052
     stretch: float = 0.11
     stretches: int = 7
-    drift: int = 7
+    drift: int = 6
     turn_cost: float = 4.0
     drift_cost: float = 0.01
     stretch_cost: float = 1.28
@@ -121,7 +121,7 @@ class RowTracer:
         The best path tells which way; about it, every state is weighed by the best path that leads through it, so
         that where several fit about as well their mean is taken.
         """
-        from robot_vision.perception.crop_rows.tracing_kernels import accumulate, recall
+        from robot_vision.perception.crop_rows.tracing_kernels import accumulate, best_through, recall
 
         cost = np.float32(self.stretch_cost)
         accumulate(scores, turn, self.drift_cost * turn, cost, self._totals)
@@ -131,11 +131,13 @@ class RowTracer:
         backwards = np.ascontiguousarray(turn[::-1])
         upwards = np.ascontiguousarray(scores[::-1])
         accumulate(upwards, backwards, self.drift_cost * backwards, cost, self._back)
-        through = self._totals + self._back[::-1, :, ::-1, :]
-        through -= scores[:, :, None, :]
+        by_phase, by_stretch = (
+            np.empty((len(scores), _PHASES), np.float32),
+            np.empty(scores.shape[:2], np.float32),
+        )
+        best_through(self._totals, self._back, scores, by_phase, by_stretch)
         best = path[:, 1:]
         aside = (np.arange(_PHASES) - best + _PHASES // 2) % _PHASES - _PHASES // 2
-        by_phase, by_stretch = through.max(axis=(1, 2)), through.max(axis=(2, 3))
         phases = _weights(by_phase, self.doubt) * (np.abs(aside) <= _NEAR_PHASES)
         lag = best[:, 0] - _PHASES // 2
         lag = lag - _PHASES * np.round(lag[-1] / _PHASES) + (phases * aside).sum(axis=1) / phases.sum(axis=1)

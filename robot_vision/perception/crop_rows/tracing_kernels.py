@@ -176,3 +176,28 @@ def recall(totals, turn_cost, stretch_cost, path):
                     came_e, came_q = ee, qq
         e, q = came_e, came_q
     return best
+
+
+@njit(cache=True, fastmath=True)
+def best_through(totals, back, scores, by_phase, by_stretch):
+    """Best total score of a path through each phase (B, P) and each stretch (B, E) of each band, to be filled.
+
+    `totals` (B, E, D, P) come from above, `back` from below, its bands and drifts the other way round.
+    """
+    bands, stretches, drifts, phases = totals.shape
+    here = np.empty(phases, np.float32)
+    for b in range(bands):
+        for j in range(phases):
+            by_phase[b, j] = -1e30
+        for e in range(stretches):
+            for j in range(phases):
+                here[j] = -1e30
+            for q in range(drifts):
+                for j in range(phases):
+                    here[j] = max(here[j], totals[b, e, q, j] + back[bands - 1 - b, e, drifts - 1 - q, j])
+            most = np.float32(-1e30)
+            for j in range(phases):
+                here[j] -= scores[b, e, j]
+                by_phase[b, j] = max(by_phase[b, j], here[j])
+                most = max(most, here[j])
+            by_stretch[b, e] = most
