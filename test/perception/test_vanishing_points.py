@@ -345,11 +345,12 @@ def test_parallel_lines_in_the_picture_lead_to_infinity():
     assert away < math.radians(0.5)
 
 
-def test_lines_that_are_not_finite_are_clutter():
+@pytest.mark.parametrize("nonsense", [np.nan, np.inf, 1e5, -1e30])
+def test_lines_that_no_camera_sees_are_clutter(nonsense):
     truth = scene(np.random.default_rng(5), CAMERA, upright_axes(np.random.default_rng(5)), [30] * 3, 0.2)
     ends = truth.lines.endpoints.copy()
     spoilt = np.arange(0, len(ends), 7)
-    ends[spoilt, spoilt % 4] = np.nan
+    ends[spoilt, spoilt % 4] = nonsense
     points = ESTIMATOR.estimate(LineSegments.from_endpoints(ends), CAMERA)
     assert (points.labels[spoilt] == -1).all()
     without = ESTIMATOR.estimate(LineSegments.from_endpoints(np.delete(ends, spoilt, axis=0)), CAMERA)

@@ -20,6 +20,8 @@ DIRECTION_SIGMA = np.deg2rad(0.35)
 #: A vanishing point this near the middle of a line, in half lengths, lies within it, whatever the ends may be off by.
 WITHIN = 0.8
 #: A line that does not tell its contrast still counts, grey levels a pixel.
+#: Sizes of the picture beyond which no lens, rectified, shows anything: a line from there was never seen.
+_FARTHEST = 10.0
 _LEAST_CONTRAST = 0.1
 
 
@@ -45,9 +47,12 @@ class Bundle:
 
     @classmethod
     def of(cls, segments: LineSegments, camera: Camera, most: int) -> Bundle:
-        """Prepare the `most` longest lines; lines that are not finite or have no length are left out."""
+        """Prepare the `most` longest lines; those that are not finite, have no length or lie far outside are left out."""
         lengths = segments.lengths
-        usable = np.flatnonzero(np.isfinite(lengths) & (lengths > 1.0))
+        with np.errstate(invalid="ignore"):
+            reach = np.abs(segments.endpoints).max(axis=1, initial=0.0)
+        seen = reach < _FARTHEST * max(camera.width, camera.height)
+        usable = np.flatnonzero(seen & np.isfinite(lengths) & (lengths > 1.0))
         source = usable[np.argsort(-lengths[usable], kind="stable")[:most]]
         ends = segments.endpoints[source]
         lengths = lengths[source]
