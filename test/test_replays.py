@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_vision.bags import BagReader, make_bag, score_heading
+from robot_vision.bags import BagReader, decode, make_bag, score_heading
+from robot_vision.bags.messages import stamp_ns
 from robot_vision.ros.replays import replay
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -17,6 +18,7 @@ CORRIDOR = ROOT / "bags" / "corridor.mcap"
 FIELD = ROOT / "bags" / "field.mcap"
 DATA = Path(os.environ.get("ROBOT_VISION_DATA", ROOT.parent / "shared" / "data"))
 PICTURES = ("lines/overlay", "rows/overlay", "image", "image/compressed")
+TWIST = "geometry_msgs/msg/TwistStamped"
 CHAIN = ("line_detector", "vp_estimator", "corridor_steering")
 
 
@@ -47,7 +49,9 @@ def test_the_field_is_followed_within_a_centimetre(tmp_path: Path) -> None:
     place = {"transport": "compressed", "camera.height": 1.4, "camera.pitch": 0.6109, "row.spacing": 0.5}
     answers = tmp_path / "rows.mcap"
     replay(FIELD, answers, ["crop_row_steering"], "steering", {"crop_row_steering": place}, exclude=PICTURES)
-    assert len(said(answers, "steering")) == 100
+    # the last one may be answered twice: when the replay's clock has gone, the robot is told to stand
+    stamps = {stamp_ns(decode(cdr, TWIST)) for cdr in said(answers, "steering")}
+    assert len(stamps) == 100
     score = score_heading(answers)
     assert score.missing <= 5
     assert score.yaw_rms_deg <= 0.5
