@@ -19,6 +19,7 @@ CLASSES = {
     "line_detector": "LineDetectorNode",
     "vp_estimator": "VpEstimatorNode",
     "corridor_steering": "CorridorSteeringNode",
+    "plan_view_mapper": "PlanViewMapperNode",
     "bag_player": "BagPlayer",
     "bag_recorder": "BagRecorder",
     "simulator": "Simulator",
