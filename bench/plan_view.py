@@ -40,7 +40,7 @@ CORRIDORS = (
     ("corridor_blocked", {}, 104),
 )
 PATHS = (("path", {}, 105), ("path", {}, 106))
-SECONDS, QUICK_S = 8.0, 2.0
+SECONDS, QUICK_S = 6.0, 2.0
 _TRUTH_EVERY = 3
 LONG_DRIVE = 10_000
 

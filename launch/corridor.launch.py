@@ -21,6 +21,7 @@ ARGUMENTS = (
     ("transport", "raw", "how pictures come: raw or compressed"),
     ("camera_height", "0.0", "of the camera over the ground, m; 0: not known"),
     ("camera_pitch", "0.0", "of the camera, rad; down is positive"),
+    ("map", "false", "whether to map the floor, so that the robot stops before what stands in the way"),
     ("bag", "", "a bag to replay; the graph ends with it"),
     ("rate", "1.0", "seconds of the bag in a second"),
     ("record", "", "a bag to record all topics into"),
@@ -71,6 +72,13 @@ def generate_launch_description() -> LaunchDescription:
             node("line_detector", {"transport": given["transport"]}, replay_time),
             node("vp_estimator", place, replay_time),
             node("corridor_steering", upright, replay_time),
+            node(
+                "plan_view_mapper",
+                {"transport": given["transport"]},
+                place,
+                replay_time,
+                condition=IfCondition(given["map"]),
+            ),
             player,
             RegisterEventHandler(end),
         ]

@@ -90,6 +90,7 @@ def generate_launch_description() -> LaunchDescription:
             node("line_detector", simulated_time),
             node("vp_estimator", place, simulated_time),
             node("corridor_steering", {"speed": given_as("speed")}, upright, simulated_time),
+            node("plan_view_mapper", place, simulated_time),
             simulator,
             RegisterEventHandler(end),
         ]

@@ -21,6 +21,7 @@ CLASSES = {
     "corridor_steering": "CorridorSteeringNode",
     "maze_planner": "MazePlannerNode",
     "crop_row_steering": "CropRowSteeringNode",
+    "plan_view_mapper": "PlanViewMapperNode",
     "bag_player": "BagPlayer",
     "bag_recorder": "BagRecorder",
     "simulator": "Simulator",

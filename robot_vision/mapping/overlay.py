@@ -47,9 +47,7 @@ def draw_plan_view(picture: Picture, lines: LineSegments, estimate: PlanViewEsti
         _draw_parallax(empty, seen),
         plan,
     ]
-    for part, name in zip(
-        parts, ("lines, floor, shadows, things", "floor or not", "parallax", "plan"), strict=True
-    ):
+    for part, name in zip(parts, ("lines, floor, things", "floor or not", "parallax", "plan"), strict=True):
         cv2.putText(part, name, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 3, cv2.LINE_AA)
         cv2.putText(part, name, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
     return np.vstack([np.hstack(parts[:2]), np.hstack(parts[2:])])
