@@ -47,7 +47,7 @@ class Bundle:
 
     @classmethod
     def of(cls, segments: LineSegments, camera: Camera, most: int) -> Bundle:
-        """Prepare the `most` longest lines; those that are not finite, have no length or lie far outside are left out."""
+        """Prepare the `most` longest lines, without those that are not finite, have no length or lie far outside."""
         lengths = segments.lengths
         with np.errstate(invalid="ignore"):
             reach = np.abs(segments.endpoints).max(axis=1, initial=0.0)
