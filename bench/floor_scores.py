@@ -38,7 +38,6 @@ class PictureScores:
         shadow: share of visible floor in shadow that is called something else.
         found: by kind of object, whether the end of the floor is right in half of its columns.
         distance: relative errors of the distance of found objects.
-        clearance: absolute (m) and relative errors.
     """
 
     iou: list[float] = field(default_factory=list)

@@ -8,10 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.closed_loop import drive  # noqa: E402  (the benchmarks are not installed)
-
-BOX_FRONT_M, START_M, ROBOT_FRONT_M = 10.0, 1.2, 0.3
-"""Along the corridor: where the box begins and base_link starts; the robot reaches so far before that."""
+from bench.closed_loop import drive, drive_at_box, room_before_box  # noqa: E402  (the benchmarks are not installed)
 
 
 def test_the_graph_keeps_to_the_middle_of_a_corridor() -> None:
@@ -24,7 +21,6 @@ def test_the_graph_keeps_to_the_middle_of_a_corridor() -> None:
 
 
 def test_the_graph_comes_to_rest_before_a_box_in_the_way() -> None:
-    driven = drive(seed=1, mapped=True, rate=10, world="corridor_blocked", settings=[""], seconds=13.0)
+    driven = drive_at_box(seed=1)
     assert driven["contacts"] == 0, driven
-    left = BOX_FRONT_M - START_M - driven["way_m"] - ROBOT_FRONT_M
-    assert 0.3 <= left <= 1.5, driven
+    assert 0.3 <= room_before_box(driven) <= 1.5, driven

@@ -231,3 +231,13 @@ def projected(camera: Camera, points: ArrayLike, x: float) -> NDArray[np.float64
     """Pixels (N, 2) of points (N, 3) of the world, seen by a robot at x on the middle line, looking ahead."""
     pose = optical_pose(camera, x, 0.0, 0.0)
     return camera.pixels((np.asarray(points, np.float64) - pose[:3, 3]) @ pose[:3, :3])
+
+
+def test_crates_stand_along_the_walls_and_disguised_ones_are_clad_with_the_floor() -> None:
+    shape = CorridorSettings(length=14.0, crates=2, disguised=2)
+    world, bare = corridor(shape, 3), corridor(CorridorSettings(length=14.0), 3)
+    heights = {item.name: item.height for item in world.objects if item.kind == "object"}
+    assert sorted(name.rstrip("0123456789 ") for name in heights) == ["crate"] * 2 + ["disguised crate"] * 2
+    for name, height in heights.items():
+        assert (0.3 if name.startswith("disguised") else 0.2) <= height <= 0.5
+    assert len(world.scene.quads) == len(bare.scene.quads) + 4 * 5
