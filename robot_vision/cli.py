@@ -238,7 +238,10 @@ def calibrate(
 def centres(
     image: Annotated[Path, typer.Argument(help="The picture of a plate with holes, discs or dots.")],
     output: Annotated[
-        Optional[Path], typer.Option("-o", "--output", help="The picture to write, centres drawn on it.")
+        Optional[Path],
+        typer.Option(
+            "-o", "--output", help="The picture to write, centres drawn on it [out/NAME_centres.png]."
+        ),
     ] = None,
     calibration: Annotated[
         Optional[str],
@@ -271,9 +274,14 @@ def centres(
     answer, drawing = inspect(picture, finder, camera, *plane)
     for row in table(answer):
         typer.echo(row)
-    if output is not None:
-        write_drawing(output, drawing)
-        typer.echo(f"{output}: {len(answer.found)} centres")
+    if not answer.found:
+        typer.echo("no ellipse is found: a lower --contrast finds fainter ones", err=True)
+        raise typer.Exit(1)
+    if output is None:
+        output = Path("out") / f"{image.stem}_centres.png"
+        output.parent.mkdir(exist_ok=True)
+    write_drawing(output, drawing)
+    typer.echo(f"{output}: {len(answer.found)} centres")
 
 
 @app.command()

@@ -19,7 +19,7 @@ from robot_vision.geometry.arrays import FloatArray
 from robot_vision.geometry.errors import ConicError
 
 #: An ellipse thinner than this, semi-axis to semi-axis, is a line in double precision.
-_THINNEST = 1e-7
+_THINNEST = 1e-5
 #: Nearer than this share of its size, an ellipse touches the vanishing line.
 _TOUCH = 1e-9
 

@@ -19,6 +19,8 @@ from robot_vision.geometry.errors import CrossRatioError
 
 #: What is smaller than this share of its own summands is their rounding.
 _ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+#: The same for places that came through a projection: a vanishing point 1e12 lengths away is at infinity.
+_PARALLEL = 1e-12
 
 
 @overload
@@ -59,7 +61,7 @@ def vanishing_offset(
     _check_distinct(("O", 0.0 * near), ("y1", near), ("y2", far))
     whole, part = (first + second) * near, first * far
     slant = whole - part
-    if (np.abs(slant) <= _ROUNDING * (np.abs(whole) + np.abs(part))).any():
+    if (np.abs(slant) <= _PARALLEL * (np.abs(whole) + np.abs(part))).any():
         raise CrossRatioError(
             "the picture shows the lengths in their true ratio, so the line is parallel to the picture and "
             "its vanishing point at infinity"

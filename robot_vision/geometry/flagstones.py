@@ -31,6 +31,8 @@ from robot_vision.geometry.errors import CrossRatioError
 _STEPS = 20
 #: Corners that span less than this share of a stone's squared size lie on one line.
 _FLAT = 1e-9
+#: A first guess is believed as it is while all corners lie so far (of the stones' mean) before its line.
+_BEFORE = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -181,7 +183,7 @@ def _first_guess(stones: FloatArray) -> FloatArray:
     guess = np.asarray((lines[:, :2] / lines[:, 2:]).mean(axis=0))
     # One stone seen badly may point anywhere; the search must begin with all stones on one side.
     worst = float((stones @ guess).min())
-    return guess if worst > -0.9 else guess * (-0.9 / worst)
+    return guess if worst > -_BEFORE else guess * (-0.9 / worst)
 
 
 def _closure(stones: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

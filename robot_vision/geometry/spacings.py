@@ -115,7 +115,10 @@ def fit_spacings(pixels: ArrayLike, distances: ArrayLike, sigma: ArrayLike = 0.5
             break
     residual, slope = _residuals(unknowns, m, t)
     weighted = slope * weight[:, None]
-    covariance = np.linalg.inv(weighted.T @ weighted)[2:, 2:]
+    try:
+        covariance = np.linalg.inv(weighted.T @ weighted)[2:, 2:]
+    except np.linalg.LinAlgError as error:
+        raise CrossRatioError("the marks lie so that they leave the vanishing point open") from error
     to_pixels = np.array([[scale, 0.0, centre[0]], [0.0, scale, centre[1]], [0.0, 0.0, 1.0]])
     point = to_pixels @ unknowns[2:]
     length = float(np.linalg.norm(point))

@@ -100,6 +100,10 @@ class CentreFinder:
             CentreError: nothing tells how the plane lies, or the picture has another size than the camera's.
             ConicError: the circles do not tell it, or no ellipse can lie on the plane that was given.
         """
+        if line is not None and normal is not None:
+            raise CentreError("give the plane's vanishing line or its normal, not both")
+        if line is not None and not np.any(np.asarray(line, dtype=np.float64)):
+            raise CentreError("a vanishing line (a, b, c) of zeros is no line")
         if camera is not None and gray.shape != (camera.height, camera.width):
             raise CentreError(
                 f"the picture has {gray.shape[1]} x {gray.shape[0]} pixels, its camera {camera.width} x "
@@ -108,6 +112,8 @@ class CentreFinder:
         seen = self._detector.detect(gray)
         if line is not None:
             return _centres(seen, np.asarray(line, dtype=np.float64))
+        if camera is None and normal is not None:
+            raise CentreError("the plane's normal is given; where it vanishes only a calibrated camera tells")
         if camera is None:
             raise CentreError(
                 "nothing tells how the plane lies; give its vanishing line, or a calibrated camera and, "

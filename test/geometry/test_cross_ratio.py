@@ -90,3 +90,14 @@ def test_what_names_no_vanishing_point_is_refused_with_its_reason(arguments, rea
 def test_a_point_at_infinity_has_no_length(arguments, reason):
     with pytest.raises(CrossRatioError, match=reason):
         length_ratio(*arguments)
+
+
+def test_a_line_parallel_to_the_picture_is_refused_whatever_its_rounding() -> None:
+    random = np.random.default_rng(4)
+    for _ in range(300):
+        start, way = random.uniform(-2.0, 2.0, 2), random.uniform(-1.0, 1.0, 2)
+        depth, first, second = random.uniform(1.0, 9.0), *random.uniform(0.2, 3.0, 2)
+        marks = [700.0 * (start + s * way) / depth for s in (0.0, first, first + second)]
+        y1, y2 = (float(np.linalg.norm(mark - marks[0])) for mark in marks[1:])
+        with pytest.raises(CrossRatioError, match="at infinity"):
+            vanishing_offset(y1, y2, first, second)

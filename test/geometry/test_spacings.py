@@ -117,3 +117,8 @@ def test_what_names_no_vanishing_point_is_refused_with_its_reason(marks, distanc
 def test_wrong_shapes_are_named():
     with pytest.raises(ValueError, match=r"distances must have shape \(3,\)"):
         fit_spacings([[0, 0], [3, 3], [5, 5]], [0, 1])
+
+
+def test_marks_that_leave_the_vanishing_point_open_are_refused() -> None:
+    with pytest.raises(CrossRatioError):
+        fit_spacings([[0.0, 0.0], [3.0, 2.0], [3.0, 0.0]], [0.0, 1.0, 2.0])

@@ -122,7 +122,7 @@ class CameraCalibrator:
             pitch = pitch if pitch.known else by_rows
             heights.append(height)
         known = replace(known, pitch=camera.pitch if pitch.value is None else pitch.value)
-        heights += self._heights(pictures, stamps, known, pitch, lengths)
+        heights += self._heights(pictures, stamps, known, pitch, lengths, doubt)
         height = min(heights, key=lambda finding: finding.sigma)
         progress(2 * count, 2 * count)
         if height.value is not None:
@@ -223,6 +223,7 @@ class CameraCalibrator:
         camera: Camera,
         pitch: Finding,
         lengths: KnownLengths,
+        focal_doubt: float,
     ) -> list[Finding]:
         """One finding for each length of a corridor or of stones; without any, why there is no height."""
         built = (lengths.corridor_width, lengths.stone_width, lengths.stone_length)
@@ -238,6 +239,6 @@ class CameraCalibrator:
             found.append(height_from_corridor(pictures, stamps_s, camera, lengths.corridor_width))
         if lengths.stone_width is not None or lengths.stone_length is not None:
             found += height_from_stones(
-                pictures, camera, self.estimator, lengths.stone_width, lengths.stone_length
+                pictures, camera, self.estimator, lengths.stone_width, lengths.stone_length, focal_doubt
             )
         return found

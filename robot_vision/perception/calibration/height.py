@@ -30,6 +30,8 @@ _LEAST_SHARE = 0.1
 _STONE = 0.003
 #: Heights that differ by less (relative) are the same, and how many, relative to the most, make one believed.
 _SAME = 0.04
+#: Standard deviation of the height that one picture tells by itself: relative.
+_ONE_PICTURE = 0.03
 _WITNESSES = 0.3
 
 
@@ -62,7 +64,7 @@ def height_from_corridor(
             break
     own = before * width / seen
     value, weights = robust_mean(own[told])
-    sigma = float(np.hypot(block_sigma(own[told], weights), _FOOT * value))
+    sigma = float(np.hypot(block_sigma(own[told], weights, _ONE_PICTURE * value), _FOOT * value))
     return Finding(value, sigma, int(told.sum()), f"from the corridor's width of {width:g} m", own)
 
 
@@ -72,6 +74,7 @@ def height_from_stones(
     estimator: VanishingPointEstimator,
     width: float | None,
     length: float | None,
+    focal_doubt: float = 0.0,
 ) -> list[Finding]:
     """Find the height from the spacings of a pavement, one finding for each of the two that is known.
 
@@ -81,6 +84,7 @@ def height_from_stones(
         estimator: of the vanishing points.
         width: of a stone with its joint, across the way, m.
         length: of a stone with its joint, along the way, m.
+        focal_doubt: standard deviation of the focal length, relative: distances ahead are wrong by as much.
     """
     pavement = PavementSpacings()
     spacing = np.full((len(pictures), 2), np.nan)
@@ -89,13 +93,14 @@ def height_from_stones(
         across, ahead = pavement.spacings(points, lines)
         spacing[k] = across or np.nan, ahead or np.nan
     found = []
-    for axis, (name, size) in enumerate((("width", width), ("length", length))):
+    for axis, (name, size, doubt) in enumerate((("width", width, 0.0), ("length", length, focal_doubt))):
         if size is not None:
-            found.append(_height_from_spacing(size / spacing[:, axis], f"stones' {name} of {size:g} m"))
+            own = size / spacing[:, axis]
+            found.append(_height_from_spacing(own, f"stones' {name} of {size:g} m", doubt))
     return found
 
 
-def _height_from_spacing(own: Array, what: str) -> Finding:
+def _height_from_spacing(own: Array, what: str, doubt: float) -> Finding:
     told = np.isfinite(own)
     count = int(told.sum())
     if count < max(1.0, _LEAST_SHARE * len(own)):
@@ -107,7 +112,9 @@ def _height_from_spacing(own: Array, what: str) -> Finding:
     lowest = heights[int(np.argmax(shares > _WITNESSES * shares.max()))]
     mine = np.abs(own / lowest - 1.0) < 2.0 * _SAME
     value, weights = robust_mean(own[mine])
-    sigma = float(np.hypot(block_sigma(own[mine], weights), _STONE * value))
+    sigma = float(
+        np.hypot(block_sigma(own[mine], weights, _ONE_PICTURE * value), np.hypot(_STONE, doubt) * value)
+    )
     return Finding(value, sigma, int(mine.sum()), f"from the {what}", np.where(mine, own, np.nan))
 
 

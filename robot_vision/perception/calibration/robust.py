@@ -18,17 +18,22 @@ def student_weights(squared: Array, dimensions: int) -> Array:
     return np.asarray((_FREEDOM + dimensions) / (_FREEDOM + squared))
 
 
-def block_sigma(values: Array, weights: Array) -> float:
+def block_sigma(values: Array, weights: Array, single: float | None = None) -> float:
     """Standard deviation of the weighted mean of (N,) values in order of time.
 
     Successive pictures see the same walls, so they err alike. The drive is cut into blocks and each left out in
     turn (jackknife); what independent pictures would give is the least it can be.
+
+    Args:
+        values: (N,).
+        weights: (N,), inverse variances unless `single` is given.
+        single: standard deviation of one value by itself, for when there is only one.
     """
     mean = float(weights @ values / weights.sum())
     alone = float(np.sqrt(np.sum((weights * (values - mean)) ** 2)) / weights.sum())
     blocks = min(_BLOCKS, len(values))
     if blocks < 2:
-        return float(1.0 / np.sqrt(weights.sum()))
+        return float(1.0 / np.sqrt(weights.sum())) if single is None else single
     edges = np.linspace(0, len(values), blocks + 1).astype(int)
     left_out = np.ones(blocks)
     for k in range(blocks):

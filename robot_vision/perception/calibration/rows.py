@@ -187,7 +187,7 @@ def pitch_and_height_from_rows(
 
 def _mean_of(own: Array, agree: NDArray[np.bool_], common: float, reason: str) -> Finding:
     value, weights = robust_mean(own[agree])
-    sigma = float(np.hypot(block_sigma(own[agree], weights), common))
+    sigma = float(np.hypot(block_sigma(own[agree], weights, common), common))
     return Finding(value, sigma, int(agree.sum()), reason, own)
 
 
