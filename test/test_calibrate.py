@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from typer.testing import CliRunner, Result
 
 from robot_vision import cli
-from robot_vision.bags import BagReader, BagWriter, make_bag
+from robot_vision.bags import BagError, BagReader, BagWriter, make_bag
 from robot_vision.bags.calibration import read_calibration
 from robot_vision.calibrate.drive import read_drive
 from robot_vision.perception.calibration import CameraCalibration, CameraCalibrator, KnownLengths
@@ -123,6 +123,25 @@ def test_a_spoilt_picture_costs_that_picture_only(tmp_path: Path) -> None:
     drive = read_drive(bag, None, 100, lambda done, total: None)
     assert len(drive.lines) == 5
     assert len(drive.warnings) == 1 and "picture 3 is left out" in drive.warnings[0]
+
+
+def renamed(bag: Path, copy: Path, *namespaces: str) -> Path:
+    """A few pictures of the corridor and their calibration, once in each namespace."""
+    with BagWriter(copy) as written:
+        for number, message in enumerate(BagReader(bag).messages(["image/compressed", "camera_info"])):
+            for namespace in namespaces if number < 12 else ():
+                topic = f"{namespace}/{message.topic.lstrip('/')}"
+                written.write(topic, message.type_name, message.log_time_ns, message.cdr)
+    return copy
+
+
+def test_the_camera_of_a_bag_may_have_a_namespace_but_must_be_the_only_one(tmp_path: Path) -> None:
+    one = renamed(BAGS / "corridor.mcap", tmp_path / "one.mcap", "/front/camera")
+    drive = read_drive(one, None, 100, lambda done, total: None)
+    assert len(drive.lines) == 6 and drive.camera.fx == 460.0
+    two = renamed(BAGS / "corridor.mcap", tmp_path / "two.mcap", "/left", "/right")
+    with pytest.raises(BagError, match="/left/image/compressed, /right/image/compressed"):
+        read_drive(two, None, 100, lambda done, total: None)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from robot_vision.bags import BagError, BagReader, decode
 from robot_vision.bags.calibration import read_calibration
 from robot_vision.bags.messages import picture, stamp_ns
-from robot_vision.demo.answers import picture_topic_of
+from robot_vision.bags.replay import PICTURE_TYPES
 from robot_vision.geometry import Camera
 from robot_vision.perception import LineDetector, LineSegments
 from robot_vision.perception.calibration import Plants, green_of
@@ -66,7 +66,7 @@ def read_drive(
         BagError: the bag or the calibration cannot be used, or no picture can be read.
     """
     reader = BagReader(bag)
-    topic = picture_topic_of(reader)
+    topic = _picture_topic(reader)
     count = reader.topics[topic].count
     every = max(1, -(-count // most))
     every_green = every * max(1, -(-count // (every * most_green))) if most_green else count + 1
@@ -90,7 +90,7 @@ def read_drive(
             continue
         height, width = gray.shape
         if camera is None:
-            camera = _camera(reader, calibration, width, height)
+            camera = _camera(reader, topic, calibration, width, height)
             maps = None if camera.is_rectified else camera.rectification_maps()
         if (width, height) != (camera.width, camera.height):
             expected = f"{camera.width} x {camera.height}"
@@ -134,16 +134,31 @@ def _gray(pixels: NDArray[np.generic]) -> Gray:
     return np.asarray(to_gray(pixels), np.uint8)
 
 
-def _camera(reader: BagReader, calibration: str | None, width: int, height: int) -> Camera:
+def _picture_topic(reader: BagReader) -> str:
+    """The topic of the one camera in a bag, whatever namespace it has; what the graph drew does not count."""
+    cameras = [
+        name
+        for name, topic in reader.topics.items()
+        if topic.type_name in PICTURE_TYPES and not name.endswith("/overlay")
+    ]
+    if not cameras:
+        raise BagError(f"{reader.path} holds no pictures")
+    if len(cameras) > 1:
+        raise BagError(f"{reader.path} holds pictures of more than one topic: {', '.join(cameras)}")
+    return cameras[0]
+
+
+def _camera(reader: BagReader, topic: str, calibration: str | None, width: int, height: int) -> Camera:
     """The camera as a person, or else the bag, says; uncalibrated when neither does."""
     if calibration is not None:
         return read_calibration(calibration, width, height)
-    for message in reader.messages(["camera_info"]):
+    namespace = topic.removesuffix("/compressed").rpartition("/")[0]
+    for message in reader.messages([f"{namespace}/camera_info"]):
         info = decode(message.cdr, message.type_name)
         if not np.any(np.asarray(info.k)):
             break  # zeros: the driver was never calibrated
         try:
             return Camera.from_camera_info(info)
         except ValueError as cause:
-            raise BagError(f"{reader.path}: camera_info is no calibration: {cause}") from cause
+            raise BagError(f"{reader.path}: {message.topic} is no calibration: {cause}") from cause
     return Camera.uncalibrated(width, height)
