@@ -24,6 +24,8 @@ from robot_vision.simulation.sky import Clouds
 from robot_vision.simulation.vehicle import Vehicle, VehicleSettings
 from robot_vision.simulation.world import World
 
+END_SHARE = 0.15
+"""Of the lane's length: a lane through a small maze is over so near to its end, if that is nearer than END_GAP."""
 _LOOK_STEPS = 10
 """Contact is looked for 60 times a second: every 17 mm at 1 m/s."""
 _PARTED_M = 0.02
@@ -180,7 +182,9 @@ class LiveDrive:
     def at_the_end(self) -> bool:
         """Whether the lane is over."""
         lane, pose = self.world.lane, self.lane_pose
-        return lane is not None and pose is not None and pose.along >= lane.length - END_GAP
+        if lane is None or pose is None:
+            return False
+        return pose.along >= lane.length - min(END_GAP, END_SHARE * lane.length)
 
     def picture(self) -> NDArray[np.uint8]:
         """What the camera takes now, uint8 (H, W, 3) BGR; once a moment: each has noise of its own."""

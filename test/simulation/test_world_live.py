@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.simulation import SimulationError
 from robot_vision.simulation.live import LiveDrive, LiveSettings
+from robot_vision.simulation.record import asked_world
 from robot_vision.simulation.scene import Scene, quad
 from robot_vision.simulation.texture import Texture
 from robot_vision.simulation.vehicle import VehicleSettings
@@ -149,6 +150,15 @@ def test_odometry_comes_thirty_times_a_second_at_any_rate_of_pictures() -> None:
     times = [said.time_ns for _ in range(40) for said in drive.advance()]
     np.testing.assert_allclose(np.diff(times) / 1e9, 1 / 30, atol=1e-8)
     assert len(times) == 60
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_maze_is_over_before_the_first_step(seed: int) -> None:
+    world, _ = asked_world("maze", seed, {})
+    drive = LiveDrive(world)
+    assert not drive.at_the_end
+    assert world.lane is not None
+    assert drive.lane_pose is not None and drive.lane_pose.along < 0.9 * world.lane.length
 
 
 def test_who_would_start_in_a_wall_is_told() -> None:
