@@ -21,10 +21,12 @@ _LIGHT = ((np.arange(256) / 255.0) ** _EXPONENTS[:, None]).astype(np.float32)
 _POINTS = 72
 #: px: how far a profile reaches to both sides of a border, the first that ends on even ground, and its step.
 _REACHES, _STEP = (3.5, 5.0, 6.5), 0.25
+#: A border is straight enough along a crossing that reaches less than that share of the shorter semi-axis.
+_STRAIGHT = 0.5
 #: px: how far the middle of a profile may lie from the border.
 _ASIDE = 1.0
 #: Samples at both ends, a pixel, over which a profile may rise or fall by that share of its contrast.
-_END, _EVEN = 4, 0.02
+_END, _EVEN = 4, 0.006
 #: Share of the crossings left out at either side at each distance: shadows, reflections and neighbours lie there.
 _TRIMMED = 0.2
 #: Distances from the middle at which the two sides are compared, as shares of the greatest; the last are the levels.
@@ -83,7 +85,7 @@ def _asymmetries(gray: NDArray[np.uint8], ellipse: ImageEllipse) -> tuple[Array,
     left, top = np.maximum(np.floor(points.min(axis=0)).astype(int) - margin, 0)
     right, bottom = np.ceil(points.max(axis=0)).astype(int) + margin + 1
     window = gray[top:bottom, left:right]
-    for reach in _REACHES:
+    for reach in (each for each in _REACHES if each < _STRAIGHT * ellipse.minor):
         offsets = np.arange(-reach, reach + 0.5 * _STEP, _STEP)
         places = points[:, None] + offsets[:, None] * normals[:, None] - (left, top)
         plain = _profile(window, _LIGHT[0], places)
