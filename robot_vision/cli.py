@@ -257,8 +257,11 @@ def centres(
         float, typer.Option(min=0.5, max=255.0, help="Least gradient, grey levels a pixel.")
     ] = 6.0,
     gamma: Annotated[
-        float, typer.Option(min=0.2, max=5.0, help="Of the grey levels; 1 for raw light.")
-    ] = 2.2,
+        Optional[float],
+        typer.Option(
+            min=0.2, max=5.0, help="Of the grey levels, 1 for raw light; by default the edges tell it."
+        ),
+    ] = None,
 ) -> None:
     """Find the true centres of circles and ellipses on a plate, which perspective shifts from those seen."""
     from robot_vision.bags.calibration import read_calibration

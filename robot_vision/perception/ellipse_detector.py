@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from robot_vision.geometry import ImageEllipse
+from robot_vision.perception.edge_light import light_exponent
 from robot_vision.perception.ellipse_fit import fit_ellipse
 
 Array = NDArray[np.float64]
@@ -29,6 +30,8 @@ _MARGIN, _NEAR = 8, 3.0
 _FAINT = 0.3
 #: Share of the points that must lie on the ellipse, and be bright on the same side.
 _AGREEING = 0.7
+#: Of the grey levels of ordinary cameras.
+_USUAL_GAMMA = 2.2
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class EllipseDetector:
         coverage: least share of the border that shows.
         misfit: greatest standard deviation of the edge points about an ellipse, px.
         gamma: of the picture's grey levels, which are light to the power of 1 / gamma: 2.2 fits ordinary cameras,
-            1 those that give raw light.
+            1 those that give raw light. None: told by each picture's own edges, 2.2 where they tell nothing.
     """
 
     def __init__(
@@ -75,7 +78,7 @@ class EllipseDetector:
         smallest: float = 3.0,
         coverage: float = 0.8,
         misfit: float = 0.3,
-        gamma: float = 2.2,
+        gamma: float | None = None,
     ) -> None:
         for name, value, low, high in (
             ("contrast", contrast, 0.5, 255.0),
@@ -85,7 +88,7 @@ class EllipseDetector:
             ("misfit", misfit, 0.01, 5.0),
             ("gamma", gamma, 0.2, 5.0),
         ):
-            if not low <= value <= high:
+            if value is not None and not low <= value <= high:
                 raise ValueError(f"{name} must lie between {low:g} and {high:g}, not {value}")
         self._contrast, self._blur = contrast, blur
         self._smallest, self._coverage, self._misfit = smallest, coverage, misfit
@@ -102,19 +105,21 @@ class EllipseDetector:
         if gray.ndim != 2 or gray.dtype != np.uint8 or gray.size == 0:
             raise ValueError(f"gray must be uint8 (H, W), not {gray.dtype} {gray.shape}")
         points, normals, _ = _edges(gray, self._blur, self._contrast)
-        coarse = (self._ellipse(points[chain], normals[chain]) for chain in _chains(points, normals))
-        fine = (self._in_light(gray, each) for each in coarse if each is not None)
+        chains = (self._ellipse(points[chain], normals[chain]) for chain in _chains(points, normals))
+        coarse = [each for each in chains if each is not None]
+        gamma = self._gamma or light_exponent(gray, [each.ellipse for each in coarse]) or _USUAL_GAMMA
+        fine = (self._in_light(gray, each, gamma) for each in coarse)
         return sorted(
             (each for each in fine if each is not None), key=lambda each: (each.ellipse.v, each.ellipse.u)
         )
 
-    def _in_light(self, gray: NDArray[np.uint8], coarse: SeenEllipse) -> SeenEllipse | None:
+    def _in_light(self, gray: NDArray[np.uint8], coarse: SeenEllipse, gamma: float) -> SeenEllipse | None:
         """The same ellipse by the crests of the gradient of light along its border."""
         border = coarse.ellipse.points(72)
         left, top = np.maximum(np.floor(border.min(axis=0)).astype(int) - _MARGIN, 0)
         right, bottom = np.ceil(border.max(axis=0)).astype(int) + _MARGIN + 1
         window = gray[top:bottom, left:right]
-        light = np.rint(255.0 * (window / window.max()) ** self._gamma).astype(np.uint8)
+        light = np.rint(255.0 * (window / window.max()) ** gamma).astype(np.uint8)
         points, normals, contrast = _edges(light, self._blur, 1.0)
         points = points + (left, top)
         distances, outward = _beside(coarse.ellipse, points)

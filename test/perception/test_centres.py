@@ -23,6 +23,33 @@ def views() -> list[PlateView]:
     return [plate_view(seed) for seed in SEEDS]
 
 
+def plate_in_linear_grey(seed: int, ground: int = 220, disc: int = 20) -> PlateView:
+    """Discs on a slanted plate, supersampled, whose grey levels are light, with blur and noise."""
+    random = np.random.default_rng((seed, 11))
+    camera = Camera(focal := random.uniform(400.0, 800.0), focal, 319.5, 239.5, 640, 480)
+    slant, turn = random.uniform(0.6, 1.1), random.uniform(0.0, 2.0 * np.pi)
+    normal = -np.array([np.sin(slant) * np.cos(turn), np.sin(slant) * np.sin(turn), np.cos(slant)])
+    right = np.cross(normal, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    across = np.array([right, np.cross(normal, right)])
+    angles = np.linspace(0.0, 2.0 * np.pi, 400)
+    circle = 0.08 * np.column_stack([np.cos(angles), np.sin(angles)])
+    samples, centres = 8, []
+    big = np.full((480 * samples, 640 * samples), ground, np.uint8)
+    for place in 0.21 * np.indices((7, 7)).reshape(2, -1).T - 0.63:
+        points = (circle + place) @ across + (0.0, 0.0, 1.0)
+        border = camera.pixels(points)
+        if points[:, 2].min() < 0.1 or (border < 12.0).any() or (border > (627.0, 467.0)).any():
+            continue
+        centres.append(camera.pixels((place @ across + (0.0, 0.0, 1.0))[None])[0])
+        fine = np.rint(((border + 0.5) * samples - 0.5) * 16).astype(np.int32)
+        cv2.fillPoly(big, [fine], disc, cv2.LINE_AA, 4)
+    light = cv2.resize(big, (640, 480), interpolation=cv2.INTER_AREA).astype(np.float64)
+    light = cv2.GaussianBlur(light, (0, 0), 0.7) + random.normal(0.0, 2.0, light.shape)
+    picture = cv2.cvtColor(np.rint(light.clip(0.0, 255.0)).astype(np.uint8), cv2.COLOR_GRAY2BGR)
+    return PlateView(picture, camera, np.array(centres), normal)
+
+
 def places(centres: Centres) -> np.ndarray:
     return np.array([each.centre for each in centres.found])
 
@@ -50,6 +77,20 @@ def test_corrected_centres_are_true_where_those_of_the_ellipses_are_half_a_pixel
     assert rms(true[shifted]) < 0.03
     assert rms(true) < 0.03
     assert true.max() < 0.08
+
+
+@pytest.mark.parametrize(("ground", "disc"), [(220, 20), (20, 220)])
+def test_centres_are_as_true_where_grey_levels_are_light(ground, disc):
+    plain, true = [], []
+    for seed in SEEDS:
+        view = plate_in_linear_grey(seed, ground, disc)
+        found = CentreFinder().find(view.gray, view.camera, view.normal)
+        assert len(found.found) == len(view.centres)
+        plain.append(view.errors(ellipses(found)))
+        true.append(view.errors(places(found)))
+    plain, true = np.concatenate(plain), np.concatenate(true)
+    assert (plain >= 0.5).sum() >= 30
+    assert rms(true[plain >= 0.5]) < 0.03
 
 
 def test_circles_tell_how_the_plate_lies(views):

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from robot_vision.geometry import ImageEllipse
 from robot_vision.perception import EllipseDetector
+from robot_vision.perception.edge_light import light_exponent
 from robot_vision.perception.ellipse_fit import fit_ellipse
 
 
@@ -75,14 +76,20 @@ def test_points_on_no_ellipse_give_none(points):
     assert fit_ellipse(points) is None
 
 
-def drawn(ellipses: list[ImageEllipse], inside: int = 30, outside: int = 200) -> np.ndarray:
-    """A picture of filled ellipses, eight samples a pixel, as a lens would blur it, in grey levels of gamma 2.2."""
-    big = np.full((960, 1280), (outside / 255.0) ** 2.2, np.float32)
+def drawn(
+    ellipses: list[ImageEllipse],
+    inside: int = 30,
+    outside: int = 200,
+    gamma: float = 2.2,
+    blur: float = 0.6,
+) -> np.ndarray:
+    """A picture of filled ellipses, 16 samples a pixel, as a lens would blur it, in grey levels of that gamma."""
+    big = np.full((960, 1280), (outside / 255.0) ** gamma, np.float32)
     for each in ellipses:
         border = np.rint(((each.points(720) + 0.5) * 4.0 - 0.5) * 16).astype(np.int32)
-        cv2.fillPoly(big, [border], (inside / 255.0) ** 2.2, cv2.LINE_8, 4)
-    light = cv2.GaussianBlur(cv2.resize(big, (320, 240), interpolation=cv2.INTER_AREA), (0, 0), 0.6)
-    return np.rint(255.0 * light ** (1.0 / 2.2)).astype(np.uint8)
+        cv2.fillPoly(big, [border], (inside / 255.0) ** gamma, cv2.LINE_8, 4)
+    light = cv2.GaussianBlur(cv2.resize(big, (320, 240), interpolation=cv2.INTER_AREA), (0, 0), blur)
+    return np.rint(255.0 * light ** (1.0 / gamma)).astype(np.uint8)
 
 
 ELLIPSES = [
@@ -105,6 +112,30 @@ def test_ellipses_are_found_to_hundredths_of_a_pixel(inside, outside):
         )
         assert each.dark == (inside < outside)
         assert each.coverage > 0.95
+
+
+@pytest.mark.parametrize("gamma", [1.0, 1.5, 2.2])
+@pytest.mark.parametrize("blur", [0.6, 1.5])
+@pytest.mark.parametrize(("inside", "outside"), [(30, 200), (220, 60)])
+def test_borders_tell_the_gamma_of_a_picture(gamma, blur, inside, outside):
+    assert light_exponent(drawn(ELLIPSES, inside, outside, gamma, blur), ELLIPSES) == pytest.approx(
+        gamma, abs=0.3
+    )
+
+
+def test_borders_on_uneven_ground_or_none_tell_no_gamma():
+    assert light_exponent(drawn(ELLIPSES), []) is None
+    assert light_exponent(np.full((240, 320), 77, np.uint8), ELLIPSES) is None
+    rows, columns = np.indices((240, 320))
+    stripes = np.where((rows + columns) % 5 < 2, 200, 40).astype(np.uint8)
+    assert light_exponent(stripes, ELLIPSES) is None
+
+
+def test_a_gamma_that_is_given_is_kept():
+    raw = drawn(ELLIPSES, gamma=1.0)
+    told, given, wrong = (EllipseDetector(gamma=gamma).detect(raw)[0].ellipse for gamma in (None, 1.0, 2.2))
+    assert told.minor == pytest.approx(given.minor, abs=0.03)
+    assert abs(wrong.minor - given.minor) > 0.05
 
 
 def test_a_hole_beside_a_border_is_told_from_it():
