@@ -124,7 +124,7 @@ def test_it_says_where_it_stands_in_the_row_and_drives(bench: NodeBench, field: 
     assert lane.offset == pytest.approx(field[-1].truth[0], abs=0.025)
     assert lane.yaw == pytest.approx(field[-1].truth[1], abs=math.radians(1.0))
     assert 0.0 < lane.offset_variance < 0.03**2
-    assert bench.state("level") == "0"
+    bench.until(lambda: bench.state("level") == "0", "diagnostics say that all is well")
 
 
 def test_no_picture_of_rows_no_steering_and_the_next_good_one_steers(
