@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -166,10 +166,11 @@ def test_the_overlay_shows_every_stage_and_an_empty_one_where_nothing_is_known()
     assert not empty[:240, 320:].any()
 
 
+@dataclass(frozen=True)
 class Fenced(Seen):
     """Floor on both sides of a fence with a gap, all of it seen."""
 
-    gap = 0.0
+    gap: float = 0.0
 
     def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         fence = (y > 0.8) & (y < 1.0) & (np.abs(x - 4.0) > 0.5 * self.gap)
@@ -180,8 +181,7 @@ class Fenced(Seen):
 def test_floor_that_hangs_together_with_the_robots_only_by_a_crack_is_not_called_free(
     gap: float, joined: bool
 ) -> None:
-    seen = Fenced(wall_at(6.0), VIEW, 6.0)
-    object.__setattr__(seen, "gap", gap)
+    seen = Fenced(wall_at(6.0), VIEW, 6.0, gap=gap)
     grown = OccupancyMap()
     grown.update(seen, Pose(0.0, 0.0, 0.0), trust=20.0)
     grid = grown.grid()
