@@ -38,7 +38,7 @@ class OccupancyMap:
     resolution: float = 0.05
     free: float = 0.35
     taken: float = 0.6
-    near: float = 4.0
+    near: float = 3.0
     limit: float = 4.0
     known: float = 0.6
     moved: tuple[float, float] = (0.02, 0.02)

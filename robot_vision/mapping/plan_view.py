@@ -43,15 +43,15 @@ class Seen:
         reach: beyond which nothing is said, m from the camera.
         thickness: of the part behind the end of the floor that is taken for the thing that stands there, m.
         margin: before the end of the floor within which nothing is said, m: an edge is seen to about as much.
-        inside: behind the end of the floor up to which nothing is said, m: half a cell, for a cell of which the larger
-            part is free is no obstacle.
+        inside: behind the end of the floor up to which nothing is said, m: half a cell, all of which must lie
+            behind it.
     """
 
     boundary: Boundary
     view: GroundView
     reach: float
     thickness: float = 0.15
-    margin: float = 0.02
+    margin: float = 0.01
     inside: float = 0.025
 
     def at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> Cells:
