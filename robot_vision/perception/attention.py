@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
-from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.attention_layout import Layout, lay_out
+from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.region import Region
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing import Role, VanishingPoints
@@ -108,7 +108,8 @@ class Attention:
         self._camera = points.camera
         primary = points.of(Role.PRIMARY)
         if self.reason or primary is None:
-            return self._everywhere()
+            self.asked = self._layout = None
+            return None
         up = points.camera.optical_to_base[2] if attitude is None else attitude.up
         if self._layout is None:
             self._layout = lay_out(lines, points, primary, up, self.budget)
@@ -116,11 +117,13 @@ class Attention:
             self._lead = int(points.ids[primary])
             if self._layout is None:
                 self.reason = "no part of the picture holds enough of what leads ahead"
-                return self._everywhere()
+                self.asked = self._layout = None
+            return None
         self._pictures += 1
         if self._pictures >= self.every:
             self.reason = "whole picture due"
-            return self._everywhere()
+            self.asked = self._layout = None
+            return None
         seconds = min(step, _LONGEST_STEP) if np.isfinite(step) else _LONGEST_STEP
         turned = seconds * (_UNKNOWN_TURN if turn_rate is None else abs(turn_rate))
         room = (self.margin + turned, 0.5 * self.margin + 0.5 * seconds * _NOD)
@@ -129,9 +132,6 @@ class Attention:
             self.reason = "the vanishing line leaves the picture"
             self._layout = None
         return self.asked
-
-    def _everywhere(self) -> None:
-        self.asked = self._layout = None
 
     def _surprise(
         self, lines: LineSegments, points: VanishingPoints, before: tuple[float, float] | None, step: float
@@ -159,10 +159,10 @@ class Attention:
         if len(lines) < self.least_lines * self._layout.lines:
             return "few lines"
         upright = points.of(Role.VERTICAL)
-        support = (points.weight[primary], 0.0 if upright is None else points.weight[upright])
-        if any(
-            now < self.least_support * then
-            for now, then in zip(support, self._layout.support, strict=True)
+        led, stood = self._layout.support
+        # Uprights come and go as they are passed; what leads ahead does not.
+        if points.weight[primary] < self.least_support * led or (
+            stood > 0.0 and (upright is None or points.weight[upright] < 0.5 * self.least_support * stood)
         ):
             return "little support"
         return ""

@@ -21,7 +21,7 @@ _TOPS = np.radians([0.0, 1.0, 2.0, 3.0, 4.0])
 #: Room above that a region will be given besides, about, rad; beside it gets a column.
 _ROOM = 0.02
 #: The vanishing point has so much of the region on each side of it, rad.
-_BESIDE = 0.14
+_BESIDE = 0.1
 _COLUMNS = 32
 #: Points along a line by which it is told what part of it lies in a region.
 _STATIONS = 8
@@ -34,10 +34,11 @@ _PIXELS = 0.5
 #: A whole look that found fewer lines than this was followed by a second, fainter one; a region is spared one of both.
 _FEW, _SPARED = 120, 1.3
 #: Least share of what leads ahead on the floor that a region must hold.
-_LEAST = 0.45
-_BEGIN, _END = (np.array(pairs) for pairs in zip(
-    *((i, j) for i in range(_COLUMNS) for j in range(i + 1, _COLUMNS + 1)), strict=True
-))
+_LEAST = 0.3
+_BEGIN, _END = (
+    np.array(pairs)
+    for pairs in zip(*((i, j) for i in range(_COLUMNS) for j in range(i + 1, _COLUMNS + 1)), strict=True)
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,9 @@ class Layout:
         column = float(points.pixels[primary][0])
         beside, above = room[0] * camera.fx, room[1] * camera.fy
         left = 0.0 if self.left is None else np.clip(column + self.left - beside, 0.0, camera.width)
-        right = camera.width if self.right is None else np.clip(column + self.right + beside, 0.0, camera.width)
+        right = (
+            camera.width if self.right is None else np.clip(column + self.right + beside, 0.0, camera.width)
+        )
         rows = vanishing_rows(points, primary, up, np.array([left, right]))
         if rows is None:
             return None
@@ -128,7 +131,7 @@ def lay_out(
     value = np.tensordot(_VALUES, shares[:3], 1) - _THRIFT * cost
     around = _evenly_around(column / scale, beside / scale, held[0, 0])
     value = np.where((cost <= budget) & (shares[0] >= _LEAST) & around, value, -np.inf)
-    k, pair = np.unravel_index(int(np.argmax(value)), value.shape)
+    k, pair = divmod(int(np.argmax(value)), value.shape[1])
     if not np.isfinite(value[k, pair]):
         return None
     begin, end = int(_BEGIN[pair]), int(_END[pair])
