@@ -117,8 +117,8 @@ class Attention:
             self._lead = int(points.ids[primary])
             if self._layout is None:
                 self.reason = "no part of the picture holds enough of what leads ahead"
-                self.asked = self._layout = None
-            return None
+                self.asked = None
+                return None
         self._pictures += 1
         if self._pictures >= self.every:
             self.reason = "whole picture due"

@@ -25,7 +25,7 @@ _BESIDE = 0.1
 _COLUMNS = 32
 #: Points along a line by which it is told what part of it lies in a region.
 _STATIONS = 8
-#: What leads ahead on the floor, uprights, and all that leads ahead or across: what they tell, relative to each other.
+#: What leads ahead on the floor, uprights, and all that leads ahead: what they tell, relative to each other.
 _VALUES = np.array([1.0, 0.3, 0.1])
 #: Of regions that hold about the same the cheaper one: value of the cost saved.
 _THRIFT = 0.02
@@ -35,6 +35,8 @@ _PIXELS = 0.5
 _FEW, _SPARED = 120, 1.3
 #: Least share of what leads ahead on the floor that a region must hold.
 _LEAST = 0.3
+#: Least support of the primary vanishing point that a region must promise: fewer lines may confirm it no longer.
+_LEAST_SUPPORT = 4.0
 _BEGIN, _END = (
     np.array(pairs)
     for pairs in zip(*((i, j) for i in range(_COLUMNS) for j in range(i + 1, _COLUMNS + 1)), strict=True)
@@ -105,7 +107,7 @@ def lay_out(
     upright = member & (roles == Role.VERTICAL)
     # On a road that bends the points farther ahead lead ahead, too.
     ahead = member & ((roles == Role.PRIMARY) | (roles == Role.OTHER))
-    kinds = np.stack([ahead, upright, member & ~upright, np.ones(len(lines), bool)])
+    kinds = np.stack([ahead, upright, ahead, np.ones(len(lines), bool)])
     above = (rows - v) / camera.fy
     cell = np.clip((u * (_COLUMNS / camera.width)).astype(int), 0, _COLUMNS - 1)
     piece = lines.lengths / _STATIONS
@@ -130,19 +132,19 @@ def lay_out(
         cost = cost / _SPARED
     value = np.tensordot(_VALUES, shares[:3], 1) - _THRIFT * cost
     around = _evenly_around(column / scale, beside / scale, held[0, 0])
-    value = np.where((cost <= budget) & (shares[0] >= _LEAST) & around, value, -np.inf)
+    enough = (shares[0] >= _LEAST) & (shares[2] * points.weight[primary] >= _LEAST_SUPPORT)
+    value = np.where((cost <= budget) & enough & around, value, -np.inf)
     k, pair = divmod(int(np.argmax(value)), value.shape[1])
     if not np.isfinite(value[k, pair]):
         return None
     begin, end = int(_BEGIN[pair]), int(_END[pair])
     vertical = points.of(Role.VERTICAL)
-    led = float(held[2, k, end] - held[2, k, begin]) / max(float(whole[2]), 1e-9)
     return Layout(
         None if begin == 0 else begin * scale - float(column),
         None if end == _COLUMNS else end * scale - float(column),
         float(_TOPS[k]),
         (
-            led * float(points.weight[primary]),
+            float(shares[2, k, pair] * points.weight[primary]),
             0.0 if vertical is None else float(shares[1, k, pair] * points.weight[vertical]),
         ),
         float(shares[3, k, pair]) * len(lines),
