@@ -150,7 +150,9 @@ def test_a_gap_in_time_another_camera_and_a_clock_set_back_are_surprises() -> No
     assert robot.look().attention is None or robot.attention.reason == ""
     robot = Robot()
     answer = robot.settled()
-    lines = LineSegments.from_endpoints(np.tile([300.0, 300.0, 400.0, 400.0], (len(answer.vanishing_points.labels), 1)))
+    lines = LineSegments.from_endpoints(
+        np.tile([300.0, 300.0, 400.0, 400.0], (len(answer.vanishing_points.labels), 1))
+    )
     later = (robot.picture + 1) / RATE
     for points, stamp in (
         (answer.vanishing_points, later + 3.0),
