@@ -56,7 +56,7 @@ def test_with_attention_the_corridor_is_seen_as_well_and_the_same_way_twice(tmp_
     for topic in ("attention", "lines", "heading"):
         assert said(first, topic) == said(again, topic) != []
     regions = [decode(cdr, "sensor_msgs/msg/RegionOfInterest") for cdr in said(first, "attention")]
-    assert len(regions) == 60
+    assert len(regions) == len(said(first, "lines")) >= 60
     assert sum(region.width > 0 for region in regions) > 50
     assert score_heading(first).yaw_rms_deg <= 0.1
 
