@@ -27,6 +27,7 @@ BENCHMARKS = {
     "crbd": "crop rows of single real pictures, beside the textbook's recipe",
     "field": "crop rows of recorded drives through three simulated crops",
     "field_loop": "crop rows driven along at 1.6 m/s, to the headland and through a gap",
+    "attention": "what looking where it matters saves, and what it does to every score",
     "attitude": "roll and pitch of a body that leans by up to 3 degrees",
     "road": "heading and curvature on a winding road, 500 m of bends driven ten times",
     "plan_view": "plan and map of the floor: simulated drives, a real road, cost",

@@ -45,6 +45,22 @@ def test_the_corridor_is_steered_well_and_the_same_way_twice(tmp_path: Path) -> 
     assert 0.1 < score.offset.normalised < 3.0
 
 
+def test_with_attention_the_corridor_is_seen_as_well_and_the_same_way_twice(tmp_path: Path) -> None:
+    settings = {
+        "line_detector": {"transport": "compressed"},
+        "vp_estimator": {"camera.height": 0.6, "camera.pitch": 0.0873, "attention.enabled": True},
+    }
+    first, again = tmp_path / "first.mcap", tmp_path / "again.mcap"
+    for answers in (first, again):
+        replay(CORRIDOR, answers, CHAIN[:2], "vanishing_points", settings, 4.0, exclude=PICTURES)
+    for topic in ("attention", "lines", "heading"):
+        assert said(first, topic) == said(again, topic) != []
+    regions = [decode(cdr, "sensor_msgs/msg/RegionOfInterest") for cdr in said(first, "attention")]
+    assert len(regions) == len(said(first, "lines")) >= 60
+    assert sum(region.width > 0 for region in regions) > 50
+    assert score_heading(first).yaw_rms_deg <= 0.1
+
+
 def test_the_field_is_followed_within_a_centimetre(tmp_path: Path) -> None:
     place = {"transport": "compressed", "camera.height": 1.4, "camera.pitch": 0.6109, "row.spacing": 0.5}
     answers = tmp_path / "rows.mcap"

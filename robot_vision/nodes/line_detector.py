@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hears pictures, says their straight lines in pixels of the rectified picture.
 
-Every picture is answered: one without lines, or one that cannot be read, by an empty cloud.
+Every picture is answered: one without lines, or one that cannot be read, by an empty cloud. Where somebody says on
+`attention` where to look, only that part of the picture is searched.
 """
 
 from __future__ import annotations
@@ -9,16 +10,18 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, RegionOfInterest
 
 from robot_vision.perception import LineDetector, LineSegments
 from robot_vision.perception.picture import PictureError
+from robot_vision.perception.region import Region
 from robot_vision.ros import calibration, qos
+from robot_vision.ros.attention import HeldRegion
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.images import MESSAGES, TOPICS, Rectifier, image_message
 from robot_vision.ros.messages import lines_to_message
-from robot_vision.ros.node import VisionNode
+from robot_vision.ros.node import VisionNode, stamp_ns
 from robot_vision.ros.parameters import Setting
 from robot_vision.ros.run import run_node
 
@@ -36,10 +39,17 @@ LIBRARY_SETTINGS = (
 
 
 class LineDetectorNode(VisionNode):
-    """`image` or `image/compressed` and `camera_info` to `lines` and `lines/overlay`."""
+    """`image` or `image/compressed`, `camera_info` and `attention` to `lines` and `lines/overlay`."""
 
     SETTINGS = (
         Setting("transport", "raw", "how pictures come", choices=tuple(MESSAGES), live=False),
+        Setting(
+            "attention.age",
+            0.35,
+            "how long a region heard on attention holds, s of the pictures; 0: it is not obeyed",
+            0.0,
+            10.0,
+        ),
         *LIBRARY_SETTINGS,
     )
 
@@ -48,9 +58,11 @@ class LineDetectorNode(VisionNode):
         self._detector = LineDetector()
         self._calibration = Calibration()
         self._rectifier = Rectifier()
+        self._held = HeldRegion()
         self._lines = self.say(PointCloud2, "lines", qos.ANSWER, awaited=True)
         self._overlay = self.say(Image, "lines/overlay", qos.ANSWER)
         self._camera_info = self.hear(CameraInfo, "camera_info", self._hear_camera_info, qos.SENSOR)
+        self._attention = self.hear(RegionOfInterest, "attention", self._held.take, qos.NEWEST)
         transport = self.settings["transport"]
         self._topic = TOPICS[transport]
         self.hear(
@@ -66,6 +78,10 @@ class LineDetectorNode(VisionNode):
         """Load the compiled kernels."""
         self._detector.warm_up()
 
+    def on_clock_jump_back(self) -> None:
+        """Look everywhere until somebody says anew where to look."""
+        self._held.forget()
+
     def nobody_publishes(self, topic: str) -> str:
         """Name the other transport where pictures come by that."""
         for transport, name in TOPICS.items():
@@ -80,20 +96,32 @@ class LineDetectorNode(VisionNode):
         began = time.perf_counter()
         self.follow_time(self._topic, message.header.stamp)
         self.catch_up(self._camera_info)
+        self.catch_up(self._attention)
         self._rectifier.use(self._calibration.camera)
         try:
-            lines = self._detector.detect(self._rectifier.gray(message))
+            gray = self._rectifier.gray(message)
         except PictureError as cause:
             self.complain(self._topic, str(cause))
             self._lines.publish(lines_to_message(message.header, LineSegments.empty()))
             return
+        height, width = gray.shape
+        region = self._region(stamp_ns(message.header.stamp), width, height)
+        lines = self._detector.detect(gray, region)
         self._lines.publish(lines_to_message(message.header, lines))
         self.answered(message.header.stamp, began)
-        self._tell(lines)
+        looked_at = 1.0 if region is None else region.share(width, height)
+        self._tell(lines, looked_at)
         if self._overlay.get_subscription_count():
-            self._draw(message, lines)
+            self._draw(message, lines, region)
 
-    def _tell(self, lines: LineSegments) -> None:
+    def _region(self, stamp: int, width: int, height: int) -> Region | None:
+        try:
+            return self._held.for_picture(stamp, width, height, self.settings["attention.age"])
+        except ValueError as cause:
+            self.complain("attention", f"{cause}; the whole picture is searched")
+            return None
+
+    def _tell(self, lines: LineSegments, looked_at: float) -> None:
         if self._calibration.camera is None:
             cause = f"lines are those of the raw picture: {self._calibration.fault}"
             self.complain("camera_info", cause, calibration.ADVICE)
@@ -102,12 +130,14 @@ class LineDetectorNode(VisionNode):
                 Level.WARN, "no lines in the picture", "look whether it is dark, blurred or covered"
             )
         else:
-            self.diagnostics.report(Level.OK, "finds lines")
+            self.diagnostics.report(Level.OK, f"finds lines in {100.0 * looked_at:.0f} % of the picture")
 
-    def _draw(self, message: Image | CompressedImage, lines: LineSegments) -> None:
-        from robot_vision.perception.overlay import draw_lines
+    def _draw(self, message: Image | CompressedImage, lines: LineSegments, region: Region | None) -> None:
+        from robot_vision.perception.overlay import draw_lines, draw_region
 
         drawn = draw_lines(self._rectifier.colour(message), lines)
+        if region is not None:
+            draw_region(drawn, region)
         self._overlay.publish(image_message(message.header, drawn))
 
 

@@ -13,13 +13,15 @@ from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
-from sensor_msgs.msg import CameraInfo, Imu, PointCloud2
+from sensor_msgs.msg import CameraInfo, Imu, PointCloud2, RegionOfInterest
 from std_msgs.msg import Header
 
+from robot_vision.perception.attention import Attention
 from robot_vision.perception.attitude import Lean, lean_from
 from robot_vision.perception.odometry import MotionHistory
 from robot_vision.perception.way import Kind, WayEstimate, WayEstimator
 from robot_vision.ros import calibration, messages, qos
+from robot_vision.ros.attention import region_to_message
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.node import VisionNode, stamp_ns
@@ -32,7 +34,7 @@ NO_WAY_ADVICE = "look whether the camera sees straight edges that lead ahead"
 
 
 class VpEstimatorNode(VisionNode):
-    """`lines`, `camera_info`, `odom` to `vanishing_points`, `heading`, `attitude`, `path_ahead`."""
+    """`lines`, `camera_info`, `odom` to `vanishing_points`, `heading`, `attitude`, `path_ahead`, `attention`."""
 
     SETTINGS = (
         *CAMERA_PLACE,
@@ -43,6 +45,8 @@ class VpEstimatorNode(VisionNode):
         Setting(
             "way", "auto", "auto: a corridor where walls are seen", choices=tuple(kind.value for kind in Kind)
         ),
+        Setting("attention.enabled", False, "say on attention where lines are to be looked for next"),
+        Setting("attention.every", 15, "pictures from one look at the whole picture to the next", 1, 10_000),
         Setting("path_length", 10.0, "length of path_ahead, m; on a road at most 36", 1.0, 100.0),
     )
 
@@ -56,6 +60,7 @@ class VpEstimatorNode(VisionNode):
         self._heading = self.say(PoseWithCovarianceStamped, "heading", qos.ANSWER, awaited=True)
         self._attitude = self.say(Imu, "attitude", qos.ANSWER)
         self._path = self.say(Path, "path_ahead", qos.ANSWER)
+        self._attention = self.say(RegionOfInterest, "attention", qos.ANSWER)
         self._camera_info = self.hear(CameraInfo, "camera_info", self._hear_camera_info, qos.SENSOR)
         self._odom = self.hear(Odometry, "odom", self._hear_odom, qos.ODOMETRY)
         self.hear(PointCloud2, "lines", self._hear_lines, qos.NEWEST, required=True, picture=True)
@@ -68,8 +73,19 @@ class VpEstimatorNode(VisionNode):
         self._calibration.move(camera_place(values))
         self._estimator.kind = Kind(values["way"])
         self._estimator.path_length = values["path_length"]
+        self._attend(values["attention.enabled"], values["attention.every"])
         self._estimator.set_lean(values["lean"])
         self._estimator.set_widths(values["lane.narrowest"], values["lane.widest"])
+
+    def _attend(self, enabled: bool, every: int) -> None:
+        """Begin or cease to say where to look, or change how often everywhere."""
+        attention = self._estimator.attention
+        if not enabled:
+            self._estimator.attention = None
+        elif attention is None:
+            self._estimator.attention = Attention(every=every)
+        else:
+            attention.every = every
 
     def warm_up(self) -> None:
         """Load the compiled kernels."""
@@ -123,6 +139,9 @@ class VpEstimatorNode(VisionNode):
 
     def _say(self, header: Header, estimate: WayEstimate) -> None:
         lane = estimate.lane
+        # Before anything that may lead to the next picture.
+        if self._estimator.attention is not None:
+            self._attention.publish(region_to_message(estimate.attention))
         # Before the heading, which whoever steers takes as the word to go.
         if estimate.path is not None and self._path.get_subscription_count():
             self._path.publish(messages.path_to_message(header, estimate.path))

@@ -27,26 +27,35 @@ _WORD = 8
 
 
 class EdgeFinder:
-    """Finds sub-pixel edge points in pictures of one size, in buffers that are allocated once.
+    """Finds sub-pixel edge points in pictures of one size and in parts of them, in buffers that are allocated once.
 
     Args:
-        height, width: size of the pictures, px.
+        height, width: size of the largest pictures, px.
         blur: standard deviation of the Gaussian before the gradient, px.
     """
 
     def __init__(self, height: int, width: int, blur: float) -> None:
         self.shape = (height, width)
         self._blur = blur
-        self._smooth = np.empty((height, width), np.uint8)
-        self._gu = np.empty((height, width), np.int16)
-        self._gv = np.empty((height, width), np.int16)
-        self._index = np.empty((height, width), np.int32)
+        self._bytes = np.empty(height * width, np.uint8)
+        self._gradients = np.empty((2, height * width), np.int16)
+        self._numbers = np.empty(height * width, np.int32)
         self._points = np.empty((height * width, 5), np.float32)
+        self._lay_out(height, width)
+
+    def _lay_out(self, height: int, width: int) -> None:
+        """Use the beginning of each buffer for pictures of this size."""
+        size = height * width
+        self._smooth = self._bytes[:size].reshape(height, width)
+        self._gu, self._gv = (part[:size].reshape(height, width) for part in self._gradients)
+        self._index = self._numbers[:size].reshape(height, width)
         self._squares = np.empty((_ROWS_KEPT, width), np.int32)
         self._marks = np.zeros(-(-width // _WORD) * _WORD, np.uint8)
 
     def look(self, gray: NDArray[np.uint8]) -> None:
-        """Take the gradient of a picture; `find` then tells its edge points."""
+        """Take the gradient of a picture, or of a part of one, no larger; `find` then tells its edge points."""
+        if gray.shape != self._smooth.shape:
+            self._lay_out(*gray.shape)
         smooth = gray
         if self._blur > 0.0:
             cv2.GaussianBlur(gray, (0, 0), self._blur, dst=self._smooth)

@@ -52,13 +52,19 @@ class HoughFinder:
         self._max_gap = max_gap
         self._votes = votes
 
-    def find(self, gray: NDArray[np.uint8]) -> LineSegments:
-        """Segments of one picture; the same picture gives the same segments."""
+    def find(self, gray: NDArray[np.uint8], look: int | None = None) -> tuple[LineSegments, int]:
+        """Segments of one picture, and the look that showed them; the same picture gives the same segments.
+
+        Args:
+            gray: picture, or a part of one.
+            look: the one to take; None: the first, and fainter ones while there are too few lines.
+        """
         smooth = cv2.GaussianBlur(gray, (0, 0), self._blur) if self._blur > 0.0 else gray
         gu = cv2.Sobel(smooth, cv2.CV_16S, 1, 0)
         gv = cv2.Sobel(smooth, cv2.CV_16S, 0, 1)
         lines = LineSegments.empty()
-        for seed, edge in self._levels:
+        for taken_look in range(len(self._levels)) if look is None else (look,):
+            seed, edge = self._levels[taken_look]
             edges = cv2.Canny(gu, gv, edge * _SOBEL_GAIN, seed * _SOBEL_GAIN, L2gradient=True)
             cv2.setRNGSeed(0)
             found = cv2.HoughLinesP(
@@ -69,7 +75,7 @@ class HoughFinder:
                 lines = self._refitted(found.reshape(-1, 4).astype(np.float64), gradient, edge * _SOBEL_GAIN)
             if len(lines) >= self._enough:
                 break
-        return lines
+        return lines, taken_look
 
     def _refitted(self, lines: Array, gradient: NDArray[np.float32], least: float) -> LineSegments:
         magnitude = np.hypot(gradient[..., 0], gradient[..., 1])

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_vision.perception.region import Region
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing.points import Role, VanishingPoints
 
@@ -48,6 +49,19 @@ def draw_lines(picture: Picture, lines: LineSegments, points: VanishingPoints | 
     colours = [COLOURS[Role(int(role))] for role in points.roles]
     for end, label in sorted(zip(ends, points.labels, strict=True), key=lambda drawn: int(drawn[1] >= 0)):
         _segment(picture, end, colours[label] if label >= 0 else CLUTTER, 2 if label >= 0 else 1)
+    return picture
+
+
+def draw_region(picture: Picture, region: Region) -> Picture:
+    """Darken what lies outside the region that was searched.
+
+    Args:
+        picture: BGR uint8 (H, W, 3), drawn into.
+        region: in its pixels.
+    """
+    outside = np.ones(picture.shape[:2], bool)
+    outside[region.top : region.bottom, region.left : region.right] = False
+    picture[outside] //= 2
     return picture
 
 

@@ -69,10 +69,10 @@ class _Sums(NamedTuple):
 
 
 class TraceFinder:
-    """Traces lines in pictures of one size, in buffers that are allocated once.
+    """Traces lines in pictures of one size and in parts of them, in buffers that are allocated once.
 
     Args:
-        shape: height and width of the pictures, px.
+        shape: height and width of the largest pictures, px.
         blur: standard deviation of the Gaussian before the gradient, px.
         levels: contrast of seeds and of edge points, grey levels a pixel, for the first look and for each further,
             fainter one.
@@ -97,10 +97,16 @@ class TraceFinder:
         self._members = np.empty(2 * sum(shape), np.int32)
         self._taken = np.empty(shape[0] * shape[1], np.uint8)
 
-    def find(self, gray: NDArray[np.uint8]) -> LineSegments:
-        """Segments of one picture, in the reading order of where they were met."""
+    def find(self, gray: NDArray[np.uint8], look: int | None = None) -> tuple[LineSegments, int]:
+        """Segments of one picture, in the reading order of where they were met, and the look that showed them.
+
+        Args:
+            gray: picture, or a part of one; a view will do.
+            look: the one to take; None: the first, and fainter ones while there are too few lines.
+        """
         self._edges.look(gray)
-        for level in self._levels:
+        for taken_look in range(len(self._levels)) if look is None else (look,):
+            level = self._levels[taken_look]
             index, points = self._edges.find(level.edge_contrast)
             taken = self._taken[: len(points)]
             taken[:] = 0
@@ -108,7 +114,7 @@ class TraceFinder:
             if count >= self._enough:
                 break
         lines = self._lines[:count]
-        return LineSegments(lines[:, :4].copy(), lines[:, 5].copy(), lines[:, 4].copy())
+        return LineSegments(lines[:, :4].copy(), lines[:, 5].copy(), lines[:, 4].copy()), taken_look
 
 
 @njit(**FAST)

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
+from robot_vision.perception.attention import Attention
 from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
 from robot_vision.perception.lane import LaneHeading
+from robot_vision.perception.region import Region
 from robot_vision.perception.road.estimate import RoadEstimate
 from robot_vision.perception.road.sequence import attitude_on, vanishing_sequence
 from robot_vision.perception.road.tracker import RoadTracker
@@ -52,6 +54,7 @@ class WayEstimate:
         attitude: lean of the camera; None while the picture says nothing of it.
         road: the road where it is one.
         reason: in plain words what is missing; empty when nothing is.
+        attention: where to look in the next picture; None: everywhere.
     """
 
     frame: str
@@ -61,6 +64,7 @@ class WayEstimate:
     attitude: Attitude | None
     road: RoadEstimate | None
     reason: str
+    attention: Region | None = None
 
 
 @dataclass
@@ -72,12 +76,15 @@ class WayEstimator:
         corridor: follows vanishing points and a lane between walls.
         road: follows a road.
         path_length: of the path given, m.
+        attention: chooses where to look in the next picture; None: everywhere, always. With it, `update` takes lines
+            to come from where it has asked for them.
     """
 
     kind: Kind = Kind.AUTO
     corridor: HeadingEstimator = field(default_factory=HeadingEstimator)
     road: RoadTracker = field(default_factory=RoadTracker)
     path_length: float = 10.0
+    attention: Attention | None = None
     _walled: bool | None = field(default=None, init=False, repr=False, compare=False)
     _contrary_since: float | None = field(default=None, init=False, repr=False, compare=False)
     _road_seen: float | None = field(default=None, init=False, repr=False, compare=False)
@@ -100,6 +107,8 @@ class WayEstimator:
         """Forget everything earlier pictures told."""
         self.corridor.reset()
         self.road.reset()
+        if self.attention is not None:
+            self.attention.reset()
         self._walled = self._contrary_since = self._road_seen = None
 
     def update(
@@ -119,7 +128,20 @@ class WayEstimator:
             speed: of the robot, m/s, None when unknown.
             turn_rate: of the robot, rad/s counter-clockwise, None when unknown.
         """
-        camera = camera.rectified()
+        estimate = self._estimate(lines, camera.rectified(), stamp_s, speed, turn_rate)
+        if self.attention is None:
+            return estimate
+        points, attitude = estimate.vanishing_points, estimate.attitude
+        return replace(estimate, attention=self.attention.update(lines, points, attitude, stamp_s, turn_rate))
+
+    def _estimate(
+        self,
+        lines: LineSegments,
+        camera: Camera,
+        stamp_s: float,
+        speed: float | None,
+        turn_rate: float | None,
+    ) -> WayEstimate:
         seen = self.corridor.update(lines, camera, stamp_s, turn_rate)
         if not self._look_for_road(seen, stamp_s):
             return self._in_corridor(seen)
@@ -147,8 +169,12 @@ class WayEstimator:
             return self.kind is Kind.ROAD
         vertical = seen.vanishing_points.of(Role.VERTICAL)
         walls = vertical is not None and seen.vanishing_points.weight[vertical] >= _WALLS
+        partly = self.attention is not None and self.attention.asked is not None
         if self._walled is None:
             self._walled = walls
+        elif partly and not walls:
+            # A part of a picture in which no walls are seen does not say that there are none.
+            return not self._walled
         elif walls == self._walled:
             self._contrary_since = None
         elif self._contrary_since is None or stamp_s < self._contrary_since:

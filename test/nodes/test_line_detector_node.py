@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from node_bench import NodeBench
 from numpy.typing import NDArray
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, RegionOfInterest
 
 from robot_vision.geometry import Camera
 from robot_vision.ros.images import image_message
@@ -40,6 +40,7 @@ def bench(ros_domain: int) -> Iterator[NodeBench]:
     try:
         bench.speaks(Image, "image", 5)
         bench.speaks(CameraInfo, "camera_info")
+        bench.speaks(RegionOfInterest, "attention")
         bench.hears(PointCloud2, "lines")
         bench.connect()
         yield bench
@@ -203,3 +204,78 @@ def test_the_overlay_is_drawn_for_who_listens(bench: NodeBench) -> None:
     coloured = np.abs(pixels - pixels[:, :, :1]).max(axis=2) > 40
     assert coloured[:, 155:167].sum() > 150
     assert not coloured[:, :120].any()
+
+
+def looks_at(bench: NodeBench, region: RegionOfInterest) -> PointCloud2:
+    """What is found where it is told to look, after a picture seen as a whole."""
+    assert_edge_found(show(bench, half_bright()))
+    bench.say_surely("attention", region)
+    return show(bench, half_bright())
+
+
+def rows_of(cloud: PointCloud2) -> tuple[float, float]:
+    rows = lines_from_message(cloud).endpoints[:, 1::2]
+    return float(rows.min()), float(rows.max())
+
+
+def test_only_the_region_is_searched_while_it_holds(bench: NodeBench) -> None:
+    bench.say_surely("camera_info", info_of(CAMERA))
+    region = RegionOfInterest(x_offset=100, y_offset=80, width=120, height=100)
+    assert rows_of(looks_at(bench, region)) == pytest.approx((80, 179), abs=8.0)
+    bench.until(lambda: "16 % of the picture" in bench.state("message"), "it says what share it looks at")
+    assert rows_of(show(bench, half_bright())) == pytest.approx((80, 179), abs=8.0)
+    # nobody says anything new: pictures 0.4 s later it holds no more
+    message = image_message(bench.header(step_ns=400_000_000), half_bright())
+    bench.say("image", message)
+    assert_edge_found(bench.answer("lines", message.header))
+
+
+def test_all_zero_means_everywhere_and_so_does_a_size_that_changes(bench: NodeBench) -> None:
+    region = RegionOfInterest(x_offset=100, y_offset=80, width=120, height=100)
+    assert rows_of(looks_at(bench, region))[1] < 200
+    bench.say_surely("attention", RegionOfInterest())
+    assert_edge_found(show(bench, half_bright()))
+    bench.say_surely("attention", region)
+    wide = Camera(300.0, 300.0, 199.5, 119.5, 400, HEIGHT)
+    bench.say_surely("camera_info", info_of(wide))
+    assert_edge_found(show(bench, half_bright(400, 240)), 200.5)
+    bench.say_surely("camera_info", info_of(CAMERA))
+    assert_edge_found(show(bench, half_bright()))
+
+
+@pytest.mark.parametrize(
+    ("region", "words"),
+    [
+        (RegionOfInterest(x_offset=300, width=100, height=100), "does not lie in a picture of 320 x 240"),
+        (RegionOfInterest(width=100), "100 x 0"),
+        (RegionOfInterest(x_offset=5), "0 x 0"),
+    ],
+)
+def test_a_bad_region_gets_a_line_and_the_whole_picture_is_searched(
+    bench: NodeBench, region: RegionOfInterest, words: str
+) -> None:
+    bench.say_surely("camera_info", info_of(CAMERA))
+    assert_edge_found(looks_at(bench, region))
+    bench.log_line("/attention", words, "the whole picture is searched")
+
+
+def test_at_age_zero_no_region_is_obeyed(bench: NodeBench) -> None:
+    assert bench.set_parameter("attention.age", 0.0).successful
+    assert_edge_found(looks_at(bench, RegionOfInterest(x_offset=100, y_offset=80, width=120, height=100)))
+    assert bench.set_parameter("attention.age", 0.35).successful
+
+
+def test_the_overlay_darkens_what_is_not_searched(bench: NodeBench) -> None:
+    bench.say_surely("camera_info", info_of(CAMERA))
+    bench.hears(Image, "lines/overlay")
+    region = RegionOfInterest(x_offset=100, y_offset=80, width=120, height=100)
+
+    def level(drawn: Image) -> int:
+        return int(np.frombuffer(drawn.data, np.uint8).reshape(HEIGHT, WIDTH, 3)[20, 300, 0])
+
+    bench.until(lambda: bench.node.count_publishers("lines/overlay"), "the overlay is advertised")
+    while not bench.said("lines/overlay"):
+        show(bench, half_bright())
+    cloud = looks_at(bench, region)
+    drawn = bench.answer("lines/overlay", cloud.header)
+    assert level(drawn) == 100

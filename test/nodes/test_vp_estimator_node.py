@@ -13,7 +13,7 @@ import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from node_bench import NodeBench
-from sensor_msgs.msg import CameraInfo, Imu, PointCloud2
+from sensor_msgs.msg import CameraInfo, Imu, PointCloud2, RegionOfInterest
 from std_msgs.msg import Header
 
 from robot_vision.geometry import Camera, rotation_from_rpy
@@ -56,6 +56,7 @@ def bench(ros_domain: int) -> Iterator[NodeBench]:
             (PoseWithCovarianceStamped, "heading"),
             (Imu, "attitude"),
             (Path, "path_ahead"),
+            (RegionOfInterest, "attention"),
         ):
             bench.hears(kind, topic)
         bench.connect()
@@ -262,3 +263,25 @@ def test_a_robot_that_leans_is_warned_of(calibrated: NodeBench) -> None:
     assert calibrated.set_parameter("camera.roll", 0.0).successful
     drive(calibrated, 0.1, 0.0)
     calibrated.until(lambda: "knows heading" in calibrated.state("message"), "it is well again")
+
+
+def test_where_to_look_is_said_only_when_it_is_asked_for(calibrated: NodeBench) -> None:
+    drive(calibrated, 0.0, 0.0)
+    assert not calibrated.said("attention")
+    assert calibrated.set_parameter("attention.enabled", True).successful
+    header = drive(calibrated, 0.0, 0.0, 3)
+    calibrated.until(
+        lambda: len(calibrated.said("attention")) == 3, "each picture has told where to look next"
+    )
+    assert calibrated.answer("vanishing_points", header).width
+    region = calibrated.said("attention")[-1]
+    assert 0 < region.width <= CAMERA.width - region.x_offset
+    assert region.y_offset + region.height == CAMERA.height
+    assert region.y_offset > 0
+    send(calibrated, LineSegments.empty())
+    calibrated.until(lambda: len(calibrated.said("attention")) == 4, "it says where to look after a surprise")
+    everywhere = calibrated.said("attention")[-1]
+    assert (everywhere.x_offset, everywhere.y_offset, everywhere.width, everywhere.height) == (0, 0, 0, 0)
+    assert calibrated.set_parameter("attention.enabled", False).successful
+    drive(calibrated, 0.0, 0.0, 2)
+    assert len(calibrated.said("attention")) == 4

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where to look in the next picture: a region around the lines that tell most, everywhere when surprised.
+
+What a robot steers by stands on the floor: the feet of walls, borders and kerbs run from the bottom of the picture to
+the vanishing point, uprights stand on the floor across the vanishing line. What lies higher tells the same again.
+So the region reaches from the bottom of the picture to some way above the vanishing line, and to both sides as far as
+what leads ahead on the floor. It is laid out by a look at the whole picture, as well as a given share of that
+look's cost allows, and goes along with the primary vanishing point until the next such look.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry import Camera
+from robot_vision.perception.attention_layout import Layout, lay_out
+from robot_vision.perception.attitude import Attitude
+from robot_vision.perception.region import Region
+from robot_vision.perception.segments import LineSegments
+from robot_vision.perception.vanishing import Role, VanishingPoints
+
+Array = NDArray[np.float64]
+
+#: Without a turn rate the robot may turn, and its body may nod, this fast, rad/s.
+_UNKNOWN_TURN, _NOD = 0.15, 0.15
+#: Pictures farther apart in time than this start afresh, s; between nearer ones things move a while besides, s.
+_LONGEST_STEP = 0.5
+
+
+@dataclass
+class Attention:
+    """Chooses, from what one picture showed, where lines are looked for in the next.
+
+    Args:
+        budget: cost of a look at the region, as a share of one at the whole picture.
+        every: pictures from one look at the whole picture to the next at the latest.
+        least_support: share of what the last whole look promised that vanishing points must keep.
+        least_lines: share of the lines promised that must be found.
+        jump: change of roll or pitch between two pictures that is a surprise, rad.
+        margin: kept free around what the region is laid out for, rad.
+
+    Attributes:
+        asked: the region asked for in the picture that comes next; None: everywhere.
+        reason: why it is everywhere; empty when it is not.
+
+    Raises:
+        ValueError: for settings without meaning, naming the setting.
+    """
+
+    budget: float = 0.45
+    every: int = 15
+    least_support: float = 0.5
+    least_lines: float = 0.4
+    jump: float = float(np.deg2rad(2.0))
+    margin: float = float(np.deg2rad(1.5))
+    asked: Region | None = field(default=None, init=False, compare=False)
+    reason: str = field(default="start", init=False, compare=False)
+    _layout: Layout | None = field(default=None, init=False, repr=False, compare=False)
+    _pictures: int = field(default=0, init=False, repr=False, compare=False)
+    _lead: int | None = field(default=None, init=False, repr=False, compare=False)
+    _leans: tuple[float, float] | None = field(default=None, init=False, repr=False, compare=False)
+    _camera: Camera | None = field(default=None, init=False, repr=False, compare=False)
+    _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("budget", "least_support", "least_lines"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} must be a share in (0, 1], not {getattr(self, name)}")
+        for name in ("jump", "margin"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} must be a positive number, not {value}")
+        if self.every < 1:
+            raise ValueError(f"every must be at least 1 picture, not {self.every}")
+
+    def reset(self) -> None:
+        """Forget what earlier pictures told: look everywhere next."""
+        self.asked, self.reason = None, "start"
+        self._layout = self._stamp = self._leans = None
+
+    def update(
+        self,
+        lines: LineSegments,
+        points: VanishingPoints,
+        attitude: Attitude | None,
+        stamp_s: float,
+        turn_rate: float | None = None,
+    ) -> Region | None:
+        """Take in what was seen in a picture where `asked` said.
+
+        Args:
+            lines: of the picture, with `points.labels` for each.
+            points: believed vanishing points, primary first.
+            attitude: of the camera, if the picture told of it.
+            stamp_s: time of the picture, s.
+            turn_rate: of the robot, rad/s counter-clockwise; None when unknown.
+
+        Returns:
+            Where to look in the next picture, the same as `asked`; None: everywhere.
+        """
+        step = np.inf if self._stamp is None else stamp_s - self._stamp
+        self._stamp = stamp_s
+        before, self._leans = self._leans, None if attitude is None else (attitude.roll, attitude.pitch)
+        self.reason = self._surprise(lines, points, before, step)
+        self._camera = points.camera
+        primary = points.of(Role.PRIMARY)
+        if self.reason or primary is None:
+            self.asked = self._layout = None
+            return None
+        up = points.camera.optical_to_base[2] if attitude is None else attitude.up
+        if self._layout is None:
+            self._layout = lay_out(lines, points, primary, up, self.budget)
+            self._pictures = 0
+            self._lead = int(points.ids[primary])
+            if self._layout is None:
+                self.reason = "no part of the picture holds enough of what leads ahead"
+                self.asked = None
+                return None
+        self._pictures += 1
+        if self._pictures >= self.every:
+            self.reason = "whole picture due"
+            self.asked = self._layout = None
+            return None
+        seconds = min(step, _LONGEST_STEP) if np.isfinite(step) else _LONGEST_STEP
+        turned = seconds * (_UNKNOWN_TURN if turn_rate is None else abs(turn_rate))
+        room = (self.margin + turned, 0.5 * self.margin + 0.5 * seconds * _NOD)
+        self.asked = self._layout.region(points, primary, up, room)
+        if self.asked is None:
+            self.reason = "the vanishing line leaves the picture"
+            self._layout = None
+        return self.asked
+
+    def _surprise(
+        self, lines: LineSegments, points: VanishingPoints, before: tuple[float, float] | None, step: float
+    ) -> str:
+        """Why the whole picture must be looked at; empty when nothing is odd."""
+        primary = points.of(Role.PRIMARY)
+        if primary is None or points.weight[primary] <= 0.0:
+            return "no way ahead is seen"
+        if not points.camera.focal_known:
+            return "the focal length is not known"
+        place = points.pixels[primary]
+        if not (0.0 <= place[0] < points.camera.width and 0.0 <= place[1] < points.camera.height):
+            return "the way ahead lies outside the picture"
+        if before is not None and self._leans is not None:
+            if max(abs(now - then) for now, then in zip(self._leans, before, strict=True)) > self.jump:
+                return "the attitude jumps"
+        if self._layout is None:
+            return ""
+        if not 0.0 < step <= _LONGEST_STEP:
+            return "pictures are far apart"
+        if points.camera != self._camera:
+            return "another camera"
+        if int(points.ids[primary]) != self._lead:
+            return "another way ahead"
+        if len(lines) < self.least_lines * self._layout.lines:
+            return "few lines"
+        upright = points.of(Role.VERTICAL)
+        led, stood = self._layout.support
+        # Uprights come and go as they are passed; what leads ahead does not.
+        if points.weight[primary] < self.least_support * led or (
+            stood > 0.0 and (upright is None or points.weight[upright] < 0.5 * self.least_support * stood)
+        ):
+            return "little support"
+        return ""
