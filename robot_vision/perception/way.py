@@ -170,7 +170,7 @@ class WayEstimator:
             vanishing_sequence(road, camera, lines),
             road.lane,
             road.path(along),
-            attitude_on(road),
+            attitude_on(road, camera),
             road,
             "",
         )
