@@ -177,7 +177,9 @@ class Camera:
     @property
     def optical_to_base(self) -> FloatArray:
         """Rotation (3, 3) from the optical frame to base_link: Rz(pan) Ry(pitch + tilt) Rx(roll) B."""
-        rotation: FloatArray = rotation_from_rpy(self.roll, self.pitch + self.tilt, self.pan) @ BODY_FROM_OPTICAL
+        rotation: FloatArray = (
+            rotation_from_rpy(self.roll, self.pitch + self.tilt, self.pan) @ BODY_FROM_OPTICAL
+        )
         return rotation
 
     @property

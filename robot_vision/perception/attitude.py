@@ -40,8 +40,10 @@ class Attitude:
     seen: bool
 
     @classmethod
-    def from_angles(cls, roll: float, pitch: float, covariance: Array, camera: Camera | None = None) -> Attitude:
-        """One that a picture told as roll and pitch (rad) with their covariance (2, 2); `camera`: where its head looks."""
+    def from_angles(
+        cls, roll: float, pitch: float, covariance: Array, camera: Camera | None = None
+    ) -> Attitude:
+        """One told as roll and pitch (rad) with their covariance (2, 2) by a picture of `camera`, wherever it looks."""
         turn = np.eye(3) if camera is None else camera.head_turn
         up = turn.T @ up_from_attitude(roll, pitch)
         jacobian = tangent_basis(up) @ turn.T @ _swings_of_up(roll, pitch)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
 from robot_vision.perception.attitude import Attitude
+from robot_vision.perception.gaze import Gaze, GazePlanner
 from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
 from robot_vision.perception.lane import LaneHeading
 from robot_vision.perception.road.estimate import RoadEstimate
@@ -52,6 +53,7 @@ class WayEstimate:
         attitude: lean of the camera; None while the picture says nothing of it.
         road: the road where it is one.
         reason: in plain words what is missing; empty when nothing is.
+        gaze: where a head that carries the camera should look next; None without a height of the camera.
     """
 
     frame: str
@@ -61,6 +63,7 @@ class WayEstimate:
     attitude: Attitude | None
     road: RoadEstimate | None
     reason: str
+    gaze: Gaze | None = None
 
 
 @dataclass
@@ -71,12 +74,14 @@ class WayEstimator:
         kind: of way.
         corridor: follows vanishing points and a lane between walls.
         road: follows a road.
+        gaze: chooses where to look next.
         path_length: of the path given, m.
     """
 
     kind: Kind = Kind.AUTO
     corridor: HeadingEstimator = field(default_factory=HeadingEstimator)
     road: RoadTracker = field(default_factory=RoadTracker)
+    gaze: GazePlanner = field(default_factory=GazePlanner)
     path_length: float = 10.0
     _walled: bool | None = field(default=None, init=False, repr=False, compare=False)
     _contrary_since: float | None = field(default=None, init=False, repr=False, compare=False)
@@ -100,6 +105,7 @@ class WayEstimator:
         """Forget everything earlier pictures told."""
         self.corridor.reset()
         self.road.reset()
+        self.gaze.reset()
         self._walled = self._contrary_since = self._road_seen = None
 
     def update(
@@ -120,6 +126,19 @@ class WayEstimator:
             turn_rate: of the robot, rad/s counter-clockwise, None when unknown.
         """
         camera = camera.rectified()
+        found = self._find(lines, camera, stamp_s, speed, turn_rate)
+        return replace(
+            found, gaze=self.gaze.update(found.lane, found.road, camera, stamp_s, speed, turn_rate)
+        )
+
+    def _find(
+        self,
+        lines: LineSegments,
+        camera: Camera,
+        stamp_s: float,
+        speed: float | None,
+        turn_rate: float | None,
+    ) -> WayEstimate:
         seen = self.corridor.update(lines, camera, stamp_s, turn_rate)
         if not self._look_for_road(seen, stamp_s):
             return self._in_corridor(seen)

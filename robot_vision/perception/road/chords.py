@@ -66,7 +66,9 @@ class ChordReader:
 
     def _cut(self, camera: Camera, ends: Array) -> Array:
         """Move the farther ends (N, 2, 2) px nearer where they lie beyond `farthest`, for the camera as mounted."""
-        turned = _rays(camera, ends) @ (rotation_from_rpy(camera.roll, camera.pitch, 0.0) @ BODY_FROM_OPTICAL).T
+        turned = (
+            _rays(camera, ends) @ (rotation_from_rpy(camera.roll, camera.pitch, 0.0) @ BODY_FROM_OPTICAL).T
+        )
         # Both the forward part of a ray and its fall are linear along a segment, and so is what tells the far side.
         beyond = turned[..., 0] * self._height + turned[..., 2] * (self._farthest - self._ahead)
         cut = np.array(ends)
