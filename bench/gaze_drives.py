@@ -49,7 +49,9 @@ class Moment:
     picture: NDArray[np.uint8]
 
 
-def on_road(world: World, seed: int, head: HeadSettings | None, seconds: float, speed: float) -> Iterator[Moment]:
+def on_road(
+    world: World, seed: int, head: HeadSettings | None, seconds: float, speed: float
+) -> Iterator[Moment]:
     """Drive along a road as the pictures tell, the loop of steering and that of looking closed."""
     able = VehicleSettings(kind="ackermann", most_speed=12.0)
     how = LiveSettings(rate=RATE, vehicle=able, lean=np.radians(0.3), head=head, timeout=0.5)
