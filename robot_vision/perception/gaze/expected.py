@@ -32,6 +32,8 @@ _OFFSET_SIGMA = 0.5
 _YAW_DRIFT, _OFFSET_DRIFT, _BEND_DRIFT, _LEAN = 0.05, 0.1, 0.004, 0.02
 #: Distance of the places at which borders would be measured, m, how far ahead the last, and those the way is told for.
 _STEP, _FARTHEST, _TOLD_EVERY = 1.0, 30.0, 3.0
+#: A way is known by both its borders, this much of each within this distance, m: of one alone it is not believed.
+_BOTH, _NEARBY = 6.0, 20.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,11 @@ class WayBelief:
         variance[[OFFSET, YAW, WIDTH]] = offset, lane.yaw_variance, _WIDTH_SIGMA**2
         variance[[ROLL, PITCH, PAINT]] = _LEAN**2, _LEAN**2, 1e-6
         return cls(alignment, state, np.diag(variance))
+
+    def yaw_after(self, rolled: float, turned: float) -> float:
+        """Yaw relative to the way (rad) of a robot that has rolled so far along it (m) and turned by so much (rad)."""
+        along = RoadCurve(self.alignment, self.state[BENDS:]).heading([rolled])
+        return float(self.state[YAW] + turned - along[0])
 
     def path(self, along: Array) -> Array:
         """The middle in base_link at distances (N,) from beside the robot, (N, 2) m."""
@@ -121,6 +128,7 @@ def expected_gain(
     slant = np.hypot(1.0, (share * way.state[WIDTH]) / camera.height_m)
     noise = (_PIXEL * slant * distance / camera.fx) ** 2 + (_ROUGHNESS * (1.0 + distance / _TWICE)) ** 2
     shown = shown_on_ground(there, camera, pans)
+    shown = shown * _with_both(shown, share, distance)[:, None]
     told = np.einsum("cn,ni,nj->cij", shown / noise, slopes, slopes)
     after = np.linalg.solve(np.eye(len(ready)) + ready @ told, np.broadcast_to(ready, told.shape))
     direction = way._slopes_of_direction(rolled + np.arange(0.0, ahead + 0.5 * _TOLD_EVERY, _TOLD_EVERY))
@@ -144,6 +152,13 @@ def shown_on_ground(points: Array, camera: Camera, pans: Array) -> Array:
     with np.errstate(invalid="ignore"):
         inside = (u >= 0.0) & (u <= camera.width - 1.0) & (v >= 0.0) & (v <= camera.height - 1.0)
     return np.asarray(inside, np.float64)
+
+
+def _with_both(shown: Array, share: Array, distance: Array) -> Array:
+    """How far (C,), 0 to 1, pictures that show border points (C, N) show enough of the left and of the right border."""
+    near = shown * (distance < _NEARBY)
+    less = np.minimum(near @ (share > 0.0), near @ (share < 0.0))
+    return np.asarray(np.clip(less * _STEP / _BOTH, 0.0, 1.0) ** 2)
 
 
 def _slopes_of_borders(way: WayBelief, points: Array, share: Array, camera: Camera) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
-from robot_vision.perception.gaze.bearings import LostWay, SeenFloor
+from robot_vision.perception.gaze.bearings import LostWay, SeenFloor, in_view
 from robot_vision.perception.gaze.expected import WayBelief, expected_gain
 from robot_vision.perception.lane import LaneHeading
 from robot_vision.perception.road.curve import Alignment
@@ -21,16 +21,19 @@ Array = NDArray[np.float64]
 _STEP = np.deg2rad(4.0)
 #: Until the picture that a choice is for: what a head takes to turn and settle, s.
 _HORIZON = 0.4
-#: A lost way found again, floor seen that had not been: what they are worth, nats.
-_FOUND, _FLOOR = 4.0, 0.6
+#: What they are worth: a lost way found again, floor ahead seen that had not been of late, or that comes next, nats.
+_FOUND, _FLOOR = 4.0, 0.8
 #: Share of the view's half that counts as in view: what is at the rim is not measured.
 _CORE = 0.85
-#: What turning the head costs, nats a rad, and by how much another direction must be better to be chosen instead.
-_EFFORT, _BETTER = 0.15, 0.05
+#: What turning the head costs, and looking aside, where what nobody reckons with comes from straight ahead, nats a rad;
+#: by how much another direction must be better to be chosen instead, nats.
+_EFFORT, _ASIDE, _BETTER = 0.1, 0.4, 0.05
 #: A direction within this of straight ahead is called ahead, rad.
 _AHEAD = 0.5 * _STEP
-#: The floor that the robot turns to within this time is looked at, s, for turns of more than this, rad.
-_TURNS_TO, _TURN = 1.0, 0.2
+#: A robot that will head so far off a lane leaves it (rad, and how gradually): what the lane tells then is of no use.
+_LEAVES, _GRADUALLY = 0.35, 0.35
+#: The floor that the robot turns to within this time is looked at, s, for turns of more than this, rad; directions in it.
+_TURNS_TO, _TURN, _SWEPT = 1.0, 0.2, 9
 #: Pictures farther apart than this start afresh, s.
 _LONGEST_STEP = 2.0
 #: Directions along the way that a lost one may lie in, every so far, m; no better known than this, rad.
@@ -44,7 +47,7 @@ class Gaze:
     Attributes:
         pan: of the head, rad, left positive.
         point: (3,) in base_link, m: where the lens's axis shall meet the floor, or the farthest way that counts.
-        reason: ahead, bend, floor or lost: what most of the expected gain over looking straight ahead is.
+        reason: ahead, bend, floor, turn or lost: what most of the expected gain over looking straight ahead is.
         gain: expected of a picture along it, nats.
     """
 
@@ -58,11 +61,11 @@ class Gaze:
 class GazePlanner:
     """Chooses where a head looks, from picture to picture.
 
-    For each of a few directions three gains are added up: how much surer the direction of the way at places ahead
-    would become (`expected`), the chance that a way out of sight lies there, and how much floor that the robot comes
-    to would be seen that was not seen of late. From that goes the effort to turn the head. Another direction is
-    chosen only when it is clearly better, so that the head does not swing; and what is said turns no faster than
-    `rate`.
+    For each of a few directions gains are added up: how much surer the direction of the way at places ahead
+    would become (`expected`), the chance that a way out of sight lies there, and how much floor would be seen that
+    lies on the way and was not seen of late, or that the robot turns to. From that goes what it costs to turn and to
+    look aside. Another direction is chosen only when it is clearly better, so that the head does not swing; and what
+    is said turns no faster than `rate`.
 
     Args:
         most_pan: to either side, rad.
@@ -138,7 +141,7 @@ class GazePlanner:
         pans = self._candidates()
         parts = self._gains(way, camera, pans, half_view, speed or 0.0, turn_rate or 0.0)
         gains = sum(parts.values(), np.zeros(len(pans)))
-        value = gains - _EFFORT * np.abs(pans - camera.pan)
+        value = gains - _EFFORT * np.abs(pans - camera.pan) - _ASIDE * np.abs(pans)
         self._choose(pans, value)
         most = self.rate * seconds
         self._said += float(np.clip(self._chosen - self._said, -most, most))
@@ -166,16 +169,18 @@ class GazePlanner:
         turn_rate: float,
     ) -> dict[str, Array]:
         """Expected gain (C,) of a picture along each direction, nats, by what it would tell of."""
-        coming = [np.linspace(0.0, turn_rate * _TURNS_TO, 8)] if abs(turn_rate) * _TURNS_TO > _TURN else []
         gains: dict[str, Array] = {}
+        if abs(turn_rate) * _TURNS_TO > _TURN:
+            coming = np.linspace(0.0, turn_rate * _TURNS_TO, _SWEPT)
+            gains["turn"] = _FLOOR * in_view(coming, pans, half_view).mean(axis=1)
         if way is None:
             gains["lost"] = _FOUND * self._lost.chance(pans, half_view)
         else:
+            use = _use(way, speed, turn_rate)
             told = expected_gain(way, camera, pans, self.ahead, _HORIZON, speed, turn_rate)
-            gains["bend"] = told.mean(axis=1)
-            coming.append(way.bearings(np.arange(1.0, self.ahead + 0.5))[0])
-        if coming:
-            gains["floor"] = _FLOOR * self._floor.news(np.concatenate(coming), pans, half_view)
+            gains["bend"] = use * told.mean(axis=1)
+            path = way.bearings(np.arange(1.0, self.ahead + 0.5))[0]
+            gains["floor"] = use * _FLOOR * self._floor.news(path, pans, half_view)
         return gains
 
     def _choose(self, pans: Array, value: Array) -> None:
@@ -183,6 +188,12 @@ class GazePlanner:
         kept = float(np.interp(self._chosen, pans, value))
         if value[best] > kept + _BETTER:
             self._chosen = float(pans[best])
+
+
+def _use(way: WayBelief, speed: float, turn_rate: float) -> float:
+    """How far, 0 to 1, a robot that turns so goes on along the way."""
+    off = abs(way.yaw_after(speed * _TURNS_TO, turn_rate * _TURNS_TO)) - _LEAVES
+    return float(np.clip(1.0 - off / _GRADUALLY, 0.0, 1.0))
 
 
 def _reason(parts: dict[str, Array], chosen: int, ahead: int, pan: float) -> str:
