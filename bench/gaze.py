@@ -21,8 +21,9 @@ from robot_vision.simulation.world import World
 SEEDS, QUICK_SEEDS = range(201, 205), range(201, 202)
 """None of those with which the planner's settings were chosen."""
 SECONDS, QUICK_SECONDS = 16.0, 5.0
-SETTLING_S = 2.0
-NEAREST_M, AHEAD_M = 3.0, 15.0
+SETTLING_S = 4.0
+STRETCH_M, CORNERS_M = (3.0, 15.0), (1.5, 6.0)
+"""Of the way ahead that is to be in view, on roads and in corridors 2 m wide."""
 ROADS = {
     "the bends it usually has, a lens of 70 degrees": ({}, 460.0, 8.0),
     "the sharpest bends, a lens of 70 degrees": ({"curvature": 0.05, "bend": 40.0}, 460.0, 5.0),
@@ -39,10 +40,10 @@ class Score:
     """How a drive went after settling, N pictures.
 
     Attributes:
-        in_view: (N,) share of the way from 3 to 15 m ahead that is in the picture.
+        in_view: (N,) share of a stretch of the way ahead that is in the picture.
         yaw: (N,) error of the heading, rad; nan where none is said.
         curvature: (N,) error of the curvature beside the robot, 1/m; nan likewise.
-        far: (N,) error of the way's direction 15 m ahead, rad; nan likewise.
+        far: (N,) error of the way's direction at the end of that stretch, rad; nan likewise.
         pan: (N,) of the head, rad.
     """
 
@@ -79,23 +80,35 @@ def run(quick: bool) -> list[Table]:
     mazes = [maze(seed) for seed in seeds]
     scores = [
         [
-            score(world, along_lane(world, seed, head, seconds))
+            score(world, along_lane(world, seed, head, seconds), CORNERS_M, axes=True)
             for seed, world in zip(seeds, mazes, strict=True)
         ]
         for head in (None, HeadSettings())
     ]
-    tables.append(_table(f"Corridors with corners: {len(mazes)} drives of {seconds:g} s", scores))
+    title = f"Corridors with corners, a lens of 50 degrees: {len(mazes)} drives of {seconds:g} s along their middle"
+    tables.append(_table(title, scores, CORNERS_M))
     return tables
 
 
 def maze(seed: int) -> World:
     """Corridors of 2 m with corners, seen from below the upper edge of their walls."""
     world = build_world("maze", seed, MAZE)
-    return replace(world, camera=replace(world.camera, height_m=EYE_M, pitch=EYE_PITCH))
+    seen = with_lens(world, 686.0)
+    return replace(seen, camera=replace(seen.camera, height_m=EYE_M, pitch=EYE_PITCH))
 
 
-def score(world: World, moments: Iterable[Moment]) -> Score:
-    """Hold each picture of a drive against the truth."""
+def score(
+    world: World, moments: Iterable[Moment], stretch: tuple[float, float] = STRETCH_M, axes: bool = False
+) -> Score:
+    """Hold each picture of a drive against the truth.
+
+    Args:
+        world: driven through.
+        moments: of the drive.
+        stretch: of the way ahead that is to be in view, from and to, m.
+        axes: whether the way is told by corridors along the axes of the world, whichever the robot comes from, and not
+            by a lane that rounds corners.
+    """
     assert world.lane is not None
     middle: Lane = getattr(world.lane, "road", world.lane)
     rows = []
@@ -104,20 +117,24 @@ def score(world: World, moments: Iterable[Moment]) -> Score:
             continue
         state, way = moment.state, moment.way
         pose = middle.locate(state.x, state.y, state.yaw)
-        ahead = [world.lane.point(pose.along + away)[:2] for away in np.arange(NEAREST_M, AHEAD_M + 0.5)]
-        yaw = math.nan if way.lane is None else wrap_angle(way.lane.yaw - pose.yaw)
+        ahead = [
+            world.lane.point(pose.along + away)[:2] for away in np.arange(stretch[0], stretch[1] + 0.25, 0.5)
+        ]
+        true_yaw = state.yaw if axes else pose.yaw
+        yaw = math.nan if way.lane is None else wrap_angle(way.lane.yaw - true_yaw)
+        yaw = math.remainder(yaw, math.pi / 2) if axes else yaw
         bend = far = math.nan
         if way.road is not None:
             # The line followed may be the middle of a lane: its own curvature is what the estimate tells
             aside = pose.offset - way.road.offset
             bend = way.road.curvature - pose.curvature / (1.0 - aside * pose.curvature)
-            there = middle.point(pose.along + AHEAD_M).yaw - state.yaw
-            far = wrap_angle(float(way.road.bearings([AHEAD_M])[0][0]) - there)
+            there = middle.point(pose.along + stretch[1]).yaw - state.yaw
+            far = wrap_angle(float(way.road.bearings([stretch[1]])[0][0]) - there)
         rows.append((share_in_view(moment, np.array(ahead)), yaw, bend, far, moment.camera.pan))
     return Score(*np.array(rows).T)
 
 
-def _table(title: str, scores: list[list[Score]]) -> Table:
+def _table(title: str, scores: list[list[Score]], stretch: tuple[float, float] = STRETCH_M) -> Table:
     def cells(value: object) -> list[Cell]:
         return [Cell(float(value(drives))) for drives in scores]  # type: ignore[operator]
 
@@ -130,14 +147,14 @@ def _table(title: str, scores: list[list[Score]]) -> Table:
 
     rows = [
         Row(
-            f"way from {NEAREST_M:g} to {AHEAD_M:g} m ahead in view",
+            f"way from {stretch[0]:g} to {stretch[1]:g} m ahead in view",
             "%",
             cells(lambda drives: 100.0 * joined(drives, "in_view").mean()),
         ),
         Row("heading error, RMS", "deg", cells(lambda drives: math.degrees(rms(drives, "yaw"))), 2),
         Row("curvature error, RMS", "1/km", cells(lambda drives: 1e3 * rms(drives, "curvature")), 1),
         Row(
-            f"direction {AHEAD_M:g} m ahead, error, RMS",
+            f"direction {stretch[1]:g} m ahead, error, RMS",
             "deg",
             cells(lambda drives: math.degrees(rms(drives, "far"))),
             2,

@@ -32,7 +32,7 @@ _EFFORT, _ASIDE, _BETTER = 0.1, 0.4, 0.05
 _AHEAD = 0.5 * _STEP
 #: A robot that will head so far off a lane leaves it (rad, and how gradually): what the lane tells then is of no use.
 _LEAVES, _GRADUALLY = 0.35, 0.35
-#: The floor that the robot turns to within this time is looked at, s, for turns of more than this, rad; directions in it.
+#: Where the robot turns to within this time (s) is looked at, in turns of more than this (rad); places in it.
 _TURNS_TO, _TURN, _SWEPT = 1.0, 0.2, 9
 #: Pictures farther apart than this start afresh, s.
 _LONGEST_STEP = 2.0
