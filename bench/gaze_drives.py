@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from robot_vision.control import CorridorSteering
 from robot_vision.geometry import Camera
 from robot_vision.perception import LineDetector
+from robot_vision.perception.gaze import Gaze
 from robot_vision.perception.odometry import MotionHistory
 from robot_vision.perception.way import Kind, WayEstimate, WayEstimator
 from robot_vision.simulation.body import BodyState
@@ -37,6 +38,7 @@ class Moment:
     Attributes:
         time_s: since the start.
         way: what the picture told.
+        gaze: where to look next.
         state: where the robot was.
         camera: as it looked.
         picture: uint8 (H, W, 3) BGR.
@@ -44,6 +46,7 @@ class Moment:
 
     time_s: float
     way: WayEstimate
+    gaze: Gaze | None
     state: BodyState
     camera: Camera
     picture: NDArray[np.uint8]
@@ -61,12 +64,12 @@ def on_road(
     while drive.time_ns < seconds * 1e9 and not drive.at_the_end and not drive.in_contact:
         now = drive.time_ns / 1e9
         picture = drive.picture()
-        way = eyes.see(picture, drive.camera, now)
-        yield Moment(now, way, drive.state, drive.camera, picture)
+        way, gaze = eyes.see(picture, drive.camera, now)
+        yield Moment(now, way, gaze, drive.state, drive.camera, picture)
         command = steering.update(way.lane, now, path=way.path)
         drive.steer(command.speed, command.turn_rate)
-        if drive.head is not None and way.gaze is not None:
-            drive.head.look_at(way.gaze.point.tolist())
+        if drive.head is not None and gaze is not None:
+            drive.head.look_at(gaze.point.tolist())
         for said in drive.advance():
             eyes.motion.add(said.time_ns / 1e9, said.reading.speed, said.reading.turn_rate)
 
@@ -83,10 +86,10 @@ def along_lane(world: World, seed: int, head: HeadSettings | None, seconds: floa
         camera = world.camera if turning is None else turning.camera
         picture = sensor.capture(renderer.render(state.camera_pose(camera)))
         eyes.motion.add(now, state.speed, state.turn_rate)
-        way = eyes.see(picture, camera, now)
-        yield Moment(now, way, state, camera, picture)
-        if turning is not None and way.gaze is not None:
-            turning.look_at(way.gaze.point.tolist())
+        way, gaze = eyes.see(picture, camera, now)
+        yield Moment(now, way, gaze, state, camera, picture)
+        if turning is not None and gaze is not None:
+            turning.look_at(gaze.point.tolist())
             for _ in range(steps):
                 turning.step(1 / STEPS_PER_SECOND)
 
@@ -99,11 +102,11 @@ class _Eyes:
         self._lines, self._ways = LineDetector(), WayEstimator(kind=kind, path_length=30.0)
         self._before = 0.0
 
-    def see(self, picture: NDArray[np.uint8], camera: Camera, now: float) -> WayEstimate:
+    def see(self, picture: NDArray[np.uint8], camera: Camera, now: float) -> tuple[WayEstimate, Gaze | None]:
         lines = self._lines.detect(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
         speed, turn_rate = self.motion.mean(self._before, now)
         self._before = now
-        return self._ways.update(lines, camera, now, speed, turn_rate)
+        return self._ways.update(lines, camera, now, speed, turn_rate), self._ways.look()
 
 
 def with_lens(world: World, focal: float) -> World:

@@ -119,7 +119,8 @@ class Simulator(VisionNode):
         self._advertise()
         self._states = self.create_publisher(DiagnosticArray, DIAGNOSTICS, QoSProfile(depth=10))
         self._steering = self.hear(TwistStamped, "steering", self._hear_steering, EVERY)
-        self._looks = self.hear(PointStamped, "look_at", self._hear_look_at, NEWEST)
+        head = self._drive.head is not None
+        self._looks = self.hear(PointStamped, "look_at", self._hear_look_at, NEWEST) if head else None
         self._awaited_nodes = AwaitedNodes(self, given["wait_for_nodes"])
         self._known: dict[str, int] = {}
         self._settled = 0
@@ -269,7 +270,7 @@ class Simulator(VisionNode):
         picture = self._format.say(now, self._drive.picture())
         self.diagnostics.processing_ms = 1e3 * (time.perf_counter() - began)
         self._awaited_ns, self._awaited_topics = now, {"steering"}
-        if self._drive.head is not None and self._looks.get_publisher_count():
+        if self._looks is not None and self._looks.get_publisher_count():
             self._awaited_topics.add("look_at")
         self._outputs[picture.topic].publish(encode(picture.message))
         self._pictures += 1

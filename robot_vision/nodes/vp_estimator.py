@@ -137,6 +137,7 @@ class VpEstimatorNode(VisionNode):
             self._say_vanishing_points(message.header, None)
             raise
         self._say(message.header, estimate)
+        self._say_where_to_look(message.header)
         self.answered(message.header.stamp, began)
 
     def _say(self, header: Header, estimate: WayEstimate) -> None:
@@ -144,8 +145,6 @@ class VpEstimatorNode(VisionNode):
         # Before the heading, which whoever steers takes as the word to go.
         if estimate.path is not None and self._path.get_subscription_count():
             self._path.publish(messages.path_to_message(header, estimate.path))
-        if estimate.gaze is not None:
-            self._look_at.publish(point_to_message(header, estimate.gaze.point))
         if lane is not None:
             self._heading.publish(messages.heading_to_message(header, lane, estimate.frame))
         self._say_vanishing_points(header, estimate)
@@ -160,6 +159,12 @@ class VpEstimatorNode(VisionNode):
         else:
             known = f"knows heading and offset in a {estimate.frame}"
             self.diagnostics.report(Level.OK, estimate.reason or known)
+
+    def _say_where_to_look(self, header: Header) -> None:
+        """After all else: nobody who steers waits for it."""
+        gaze = self._estimator.look() if self._look_at.get_subscription_count() else None
+        if gaze is not None:
+            self._look_at.publish(point_to_message(header, gaze.point))
 
     def _lean(self, estimate: WayEstimate) -> Lean | None:
         """Lean of the robot, where the picture tells of it."""

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,6 @@ class WayEstimate:
         attitude: lean of the camera; None while the picture says nothing of it.
         road: the road where it is one.
         reason: in plain words what is missing; empty when nothing is.
-        gaze: where a head that carries the camera should look next; None without a height of the camera.
     """
 
     frame: str
@@ -63,7 +63,16 @@ class WayEstimate:
     attitude: Attitude | None
     road: RoadEstimate | None
     reason: str
-    gaze: Gaze | None = None
+
+
+class _Newest(NamedTuple):
+    """The newest picture: what it told, its camera and time (s), how the robot moved (m/s, rad/s)."""
+
+    found: WayEstimate
+    camera: Camera
+    stamp_s: float
+    speed: float | None
+    turn_rate: float | None
 
 
 @dataclass
@@ -83,6 +92,7 @@ class WayEstimator:
     road: RoadTracker = field(default_factory=RoadTracker)
     gaze: GazePlanner = field(default_factory=GazePlanner)
     path_length: float = 10.0
+    _newest: _Newest | None = field(default=None, init=False, repr=False, compare=False)
     _walled: bool | None = field(default=None, init=False, repr=False, compare=False)
     _contrary_since: float | None = field(default=None, init=False, repr=False, compare=False)
     _road_seen: float | None = field(default=None, init=False, repr=False, compare=False)
@@ -106,6 +116,7 @@ class WayEstimator:
         self.corridor.reset()
         self.road.reset()
         self.gaze.reset()
+        self._newest = None
         self._walled = self._contrary_since = self._road_seen = None
 
     def update(
@@ -127,9 +138,19 @@ class WayEstimator:
         """
         camera = camera.rectified()
         found = self._find(lines, camera, stamp_s, speed, turn_rate)
-        return replace(
-            found, gaze=self.gaze.update(found.lane, found.road, camera, stamp_s, speed, turn_rate)
-        )
+        self._newest = _Newest(found, camera, stamp_s, speed, turn_rate)
+        return found
+
+    def look(self) -> Gaze | None:
+        """Where a head that carries the camera should look next, after the newest picture.
+
+        Asked after a picture or not at all: nobody pays for it where no head turns the camera. None before the first
+        picture, and where height or focal length of the camera is not known.
+        """
+        if self._newest is None:
+            return None
+        found, camera, stamp_s, speed, turn_rate = self._newest
+        return self.gaze.update(found.lane, found.road, camera, stamp_s, speed, turn_rate)
 
     def _find(
         self,

@@ -129,11 +129,13 @@ def expected_gain(
     noise = (_PIXEL * slant * distance / camera.fx) ** 2 + (_ROUGHNESS * (1.0 + distance / _TWICE)) ** 2
     shown = shown_on_ground(there, camera, pans)
     shown = shown * _with_both(shown, share, distance)[:, None]
-    told = np.einsum("cn,ni,nj->cij", shown / noise, slopes, slopes)
-    after = np.linalg.solve(np.eye(len(ready)) + ready @ told, np.broadcast_to(ready, told.shape))
+    size = len(ready)
+    squares = (slopes[:, :, None] * slopes[:, None, :]).reshape(len(slopes), size * size)
+    told = ((shown / noise) @ squares).reshape(len(pans), size, size)
+    after = np.linalg.solve(np.eye(size) + ready @ told, np.broadcast_to(ready, told.shape))
     direction = way._slopes_of_direction(rolled + np.arange(0.0, ahead + 0.5 * _TOLD_EVERY, _TOLD_EVERY))
-    before = np.einsum("ti,ij,tj->t", direction, ready, direction)
-    left = np.einsum("ti,cij,tj->ct", direction, after, direction)
+    before = np.sum((direction @ ready) * direction, axis=1)
+    left = np.sum((direction @ after) * direction, axis=2)
     return np.asarray(0.5 * np.log(before / np.maximum(left, 1e-12)))
 
 
