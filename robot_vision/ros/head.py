@@ -19,6 +19,8 @@ from robot_vision.ros.node import stamp_ns
 
 PAN, TILT = "camera_pan", "camera_tilt"
 BASE = "base_link"
+#: A head that is turned by no more than this looks straight ahead, rad.
+STRAIGHT = 0.01
 
 
 class Head:
@@ -67,6 +69,17 @@ class Head:
                 f"where the camera looked is not known: {age}; nothing is said of this picture"
             )
         return replace(camera, pan=angles.pan, tilt=angles.tilt)
+
+    def check_straight(self, camera: Camera, stamp_s: float) -> None:
+        """Look whether the head looked straight ahead at the time of a picture.
+
+        Raises:
+            MessageError: it did not, or nobody says so: the picture is not that of a fixed camera.
+        """
+        turned = self.turned(camera, stamp_s)
+        if max(abs(turned.pan), abs(turned.tilt)) > STRAIGHT:
+            aside = f"pan {turned.pan:.2f} rad, tilt {turned.tilt:.2f} rad"
+            raise MessageError(f"the camera looks aside ({aside}); only pictures straight ahead are used")
 
     def clear(self) -> None:
         """Forget what was said before a clock jumped; that there is a head stays known."""
