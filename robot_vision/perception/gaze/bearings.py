@@ -17,10 +17,10 @@ BEARINGS.setflags(write=False)
 #: How the belief where a way lies that is out of sight spreads, rad in 1 s (standard deviation).
 _SPREAD = 0.15
 #: A way that is in view is found within this time, s.
-_FOUND_WITHIN = 0.4
-#: Share of the belief that goes anywhere in 1 s: the way may be where nobody expects it.
-_ANYWHERE = 0.05
-#: Where a way is expected that was never seen: ahead, within this (standard deviation), rad.
+_FOUND_WITHIN = 0.8
+#: Share of the belief that goes in 1 s to where the robot heads, whatever was believed: it may know why it goes there.
+_WHERE_IT_HEADS = 0.5
+#: How near to where the robot heads a way is expected that was never seen (standard deviation), rad.
 _AHEAD = 0.7
 #: Floor that was seen so long ago is as good as new, s.
 _FORGOTTEN = 1.5
@@ -54,8 +54,20 @@ class LostWay:
         """The way is in sight and leads along these bearings (K,), rad, each known to `sigmas` (K,)."""
         self.belief = _share(np.sum([_normal(b, s) for b, s in zip(bearings, sigmas, strict=True)], axis=0))
 
-    def unseen(self, pan: float, half_view: float, seconds: float, turn: float) -> None:
-        """A picture along `pan` did not show it; `turn` (rad) is the robot's since the picture before."""
+    def left(self, heads: float) -> None:
+        """The robot leaves the way: the next one is expected where it heads, rad."""
+        self.belief = _normal(heads, _AHEAD)
+
+    def unseen(self, pan: float, half_view: float, seconds: float, turn: float, heads: float = 0.0) -> None:
+        """A picture did not show it.
+
+        Args:
+            pan: of that picture, rad.
+            half_view: what it shows to either side, rad.
+            seconds: since the picture before.
+            turn: of the robot since then, rad.
+            heads: where it will head soon, rad from where it heads now.
+        """
         belief = turned(self.belief, turn)
         spread = _SPREAD**2 * seconds / WIDTH**2
         # A step of diffusion as large as is stable; what is left over is less than a bin
@@ -63,8 +75,8 @@ class LostWay:
         belief = belief + share * (np.roll(belief, 1) - 2.0 * belief + np.roll(belief, -1))
         missed = 1.0 - np.exp(-seconds / _FOUND_WITHIN)
         belief = belief * (1.0 - missed * in_view(BEARINGS, [pan], half_view)[0])
-        anywhere = min(_ANYWHERE * seconds, 1.0)
-        self.belief = (1.0 - anywhere) * _share(belief) + anywhere / COUNT
+        elsewhere = min(_WHERE_IT_HEADS * seconds, 1.0)
+        self.belief = (1.0 - elsewhere) * _share(belief) + elsewhere * _normal(heads, _AHEAD)
 
     def chance(self, pans: Array, half_view: float) -> Array:
         """Chance (C,) that the way is in the view along each of `pans` (C,), rad."""

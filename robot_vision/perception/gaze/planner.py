@@ -133,8 +133,11 @@ class GazePlanner:
         half_view = _CORE * float(np.arctan2(0.5 * camera.width, camera.fx))
         turn = (turn_rate or 0.0) * seconds
         self._floor.look(camera.pan, half_view, seconds, turn)
+        heads = (turn_rate or 0.0) * _TURNS_TO
         if way is None:
-            self._lost.unseen(camera.pan, half_view, seconds, turn)
+            self._lost.unseen(camera.pan, half_view, seconds, turn, heads)
+        elif _use(way, speed or 0.0, turn_rate or 0.0) == 0.0:
+            self._lost.left(heads)
         else:
             bearings, sigmas = way.bearings(np.arange(_ALONG, self.ahead + 0.5 * _ALONG, _ALONG))
             self._lost.seen(bearings, np.maximum(sigmas, _VAGUE))
