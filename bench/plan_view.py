@@ -205,5 +205,5 @@ def _long_drive(pictures: int) -> tuple[float, float, float]:
         grown.update(seen, Pose(0.1 * number, 0.0, 0.0))
         spent[number] = time.process_time() - began
     tenth = pictures // 10
-    parts = (1e3 * float(np.mean(part)) for part in (spent[:tenth], spent[-tenth:]))
-    return (*parts, grown.nbytes / 1e6)  # type: ignore[return-value]
+    first, last = (1e3 * float(np.mean(part)) for part in (spent[:tenth], spent[-tenth:]))
+    return first, last, grown.nbytes / 1e6

@@ -29,7 +29,7 @@ def point_cloud(stamp_ns: int, frame_id: str, points: NDArray[np.void]) -> Any:
     """
     fields = []
     for name in points.dtype.names or ():
-        kind, offset = points.dtype.fields[name][:2]  # type: ignore[index]
+        kind, offset = points.dtype.fields[name][:2]  # type: ignore[index]  # it has fields, for it has names
         if kind.str not in _DATATYPES:
             raise BagError(f"field {name!r} of a point cloud cannot be {kind}")
         fields.append(

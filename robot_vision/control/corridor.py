@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.control.limits import Steering, approach, speed_to_stop_within
+from robot_vision.control.limits import CommandClock, Steering, approach, speed_to_stop_within
 from robot_vision.perception import LaneHeading
 from robot_vision.perception.attitude import Lean
 
 Array = NDArray[np.float64]
 
 _TOWARDS = {"left": "to the left", "right": "to the right", "forward": "forward", "back": "back"}
-_FIRST_STEP = 0.05
-_LONGEST_STEP = 0.25
 
 
 @dataclass
@@ -61,7 +59,7 @@ class CorridorSteering:
     lean_slow: float = float(np.deg2rad(8.0))
     lean_stop: float = float(np.deg2rad(20.0))
     _last: Steering = field(default_factory=lambda: Steering(0.0, 0.0), init=False, repr=False, compare=False)
-    _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
+    _clock: CommandClock = field(default_factory=CommandClock, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -78,7 +76,7 @@ class CorridorSteering:
     def reset(self) -> None:
         """Stand still, as after a stop from outside or a clock that jumped."""
         self._last = Steering(0.0, 0.0)
-        self._stamp = None
+        self._clock.reset()
 
     def update(
         self,
@@ -129,7 +127,7 @@ class CorridorSteering:
             reason = (
                 f"leans {np.degrees(lean.angle):.0f} degrees {_TOWARDS[lean.towards]}: slows not to tip over"
             )
-        seconds = self._seconds_since(stamp_s)
+        seconds = self._clock.step(stamp_s)
         # Braking for an obstacle is not softened: the wanted speed then follows the braking curve already.
         speed = wanted if obstructed else approach(self._last.speed, wanted, self.most_acceleration * seconds)
         speed = min(speed, self._last.speed + self.most_acceleration * seconds)
@@ -179,12 +177,6 @@ class CorridorSteering:
         if clearance_m is None:
             return float("inf")
         return speed_to_stop_within(clearance_m - self.stop_distance, self.most_acceleration)
-
-    def _seconds_since(self, stamp_s: float) -> float:
-        """Time since the last command, s; after a gap or a jump of the clock, a short step."""
-        seconds = _FIRST_STEP if self._stamp is None else stamp_s - self._stamp
-        self._stamp = stamp_s
-        return seconds if 0.0 <= seconds <= _LONGEST_STEP else _FIRST_STEP
 
 
 def _trusted(value: float, variance: float, most_sigma: float) -> bool:

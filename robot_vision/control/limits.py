@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,3 +31,27 @@ def approach(value: float, target: float, most: float) -> float:
 def speed_to_stop_within(distance: float, deceleration: float) -> float:
     """Highest speed (m/s) from which a vehicle comes to rest within a distance (m), braking evenly (m/s^2)."""
     return float(np.sqrt(2.0 * deceleration * max(0.0, distance)))
+
+
+@dataclass
+class CommandClock:
+    """Time between commands, by which they may differ.
+
+    Args:
+        short: step taken for the first command, and after a gap or a jump of the clock, s.
+        longest: step beyond which it is a gap, s.
+    """
+
+    short: float = 0.05
+    longest: float = 0.25
+    _last: float | None = field(default=None, init=False, repr=False, compare=False)
+
+    def reset(self) -> None:
+        """Let the next command be the first."""
+        self._last = None
+
+    def step(self, stamp_s: float) -> float:
+        """Seconds since the last command, which this one, at `stamp_s`, becomes."""
+        seconds = self.short if self._last is None else stamp_s - self._last
+        self._last = stamp_s
+        return seconds if 0.0 <= seconds <= self.longest else self.short

@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.control.limits import Steering, approach, speed_to_stop_within
-
-_FIRST_STEP, _LONGEST_STEP = 0.05, 0.25
+from robot_vision.control.limits import CommandClock, Steering, approach, speed_to_stop_within
 
 
 @dataclass
@@ -44,7 +42,7 @@ class PathPursuit:
     slowing: float = 1.2
     latency: float = 0.1
     _last: Steering = field(default_factory=lambda: Steering(0.0, 0.0), init=False, repr=False, compare=False)
-    _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
+    _clock: CommandClock = field(default_factory=CommandClock, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -54,7 +52,7 @@ class PathPursuit:
     def reset(self) -> None:
         """Stand still, as after a stop from outside or a clock that jumped."""
         self._last = Steering(0.0, 0.0)
-        self._stamp = None
+        self._clock.reset()
 
     def update(
         self,
@@ -74,7 +72,7 @@ class PathPursuit:
         if len(points) == 0 or not np.isfinite(pose).all():
             self.reset()
             return Steering(0.0, 0.0, "no way" if len(points) == 0 else "the robot's place is no number")
-        seconds = self._seconds_since(stamp_s)
+        seconds = self._clock.step(stamp_s)
         x, y, yaw = self._carried_on(pose)
         along, target, left = _ahead(points, (x, y), self.lookahead)
         away = target - (x, y)
@@ -109,12 +107,6 @@ class PathPursuit:
         """Turn rate on the spot, from which the robot can stop in time when it looks there."""
         most = min(self.most_turn_rate, float(np.sqrt(self.most_turn_acceleration * abs(bearing))))
         return float(np.copysign(most, bearing))
-
-    def _seconds_since(self, stamp_s: float) -> float:
-        """Time since the last command, s; after a gap or a jump of the clock, a short step."""
-        seconds = _FIRST_STEP if self._stamp is None else stamp_s - self._stamp
-        self._stamp = stamp_s
-        return seconds if 0.0 <= seconds <= _LONGEST_STEP else _FIRST_STEP
 
 
 def _ahead(

@@ -16,16 +16,17 @@ from robot_vision.mapping.boundary import Boundary, BoundaryFinder
 from robot_vision.mapping.clearance import Clearance
 from robot_vision.mapping.evidence import Evidence, sharp
 from robot_vision.mapping.feature_points import FeatureAnnotator, GroundPoints
-from robot_vision.mapping.ground_lines import GroundLines, LineKind
+from robot_vision.mapping.ground_lines import Borders, GroundLines, LineKind
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.horizon import Horizon, HorizonFilter
+from robot_vision.mapping.kerbs import KerbFinder
 from robot_vision.mapping.objects import GroundObject, ObjectFinder
 from robot_vision.mapping.occupancy import OccupancyMap
 from robot_vision.mapping.plan_view import PlanView, PlanViewMaker, Seen
 from robot_vision.mapping.plane_motion import Parallax, PlaneMotion
 from robot_vision.mapping.pose import Pose
 from robot_vision.mapping.shadows import ShadowFinder
-from robot_vision.perception import LineSegments, VanishingPoints
+from robot_vision.perception import LineSegments, Role, VanishingPoints
 
 Picture = NDArray[np.uint8]
 Scores = NDArray[np.float32]
@@ -93,7 +94,7 @@ class PlanViewMapper:
         trusted: relative error of a distance beyond which nothing is said; it limits the reach, too.
         unchecked: weight in the map of a picture that could not be held against an earlier one.
         slip: share of the way that odometry may be wrong by before its pictures stay out of the map.
-        horizon, appearance, motion, evidence, shadows, finder, lines, objects, maker, clearance, features, map:
+        horizon, appearance, motion, evidence, shadows, finder, lines, kerbs, objects, maker, clearance, features, map:
             the stages.
 
     Raises:
@@ -111,6 +112,7 @@ class PlanViewMapper:
     shadows: ShadowFinder = field(default_factory=ShadowFinder)
     finder: BoundaryFinder = field(default_factory=BoundaryFinder)
     lines: GroundLines = field(default_factory=GroundLines)
+    kerbs: KerbFinder = field(default_factory=KerbFinder)
     objects: ObjectFinder = field(default_factory=ObjectFinder)
     maker: PlanViewMaker = field(default_factory=PlanViewMaker)
     clearance: Clearance = field(default_factory=Clearance)
@@ -127,7 +129,7 @@ class PlanViewMapper:
 
     def reset(self) -> None:
         """Forget everything earlier pictures told, the map too."""
-        for stage in (self.horizon, self.appearance, self.motion, self.shadows, self.map):
+        for stage in (self.horizon, self.appearance, self.motion, self.shadows, self.kerbs, self.map):
             stage.reset()
         self._slips.clear()
         self._unlike = None
@@ -218,12 +220,13 @@ class PlanViewMapper:
         score = self.evidence.score(likeness, parallax)
         shadow = self.shadows.find(lower, score, view, parallax)
         score[shadow] = 1.0
-        kinds = np.zeros(len(lines), np.intp)
+        kinds, borders = np.zeros(len(lines), np.intp), Borders.none()
         if points is not None:
-            kinds = self.lines.sort(lines, points, score, self.shadows.dim(lower), view)
-        score[self.lines.cut(lines, kinds, score, view)] = -1.0
+            dim = self.shadows.dim(lower)
+            kinds, borders = self.lines.sort(lines, points, score, dim, view)
+            borders = borders.joined(self._kerbs(lines, kinds, points, score, dim, lab[top:], view, pose))
+        score[self.lines.cut(borders, score.shape, view)] = -1.0
         boundary = self.finder.find(score, sharp(gray, 4.0, 4)[top:], gray, view, reach)
-        borders = lines.endpoints[kinds == LineKind.BORDER]
         straight = self.lines.straighten(boundary, borders, view)
         on_border = straight.rows != boundary.rows
         seen = Seen(straight, view, reach)
@@ -242,6 +245,23 @@ class PlanViewMapper:
             reason=reason,
             layers=Layers(view, gray, score, shadow, parallax, kinds, straight),
         )
+
+    def _kerbs(
+        self,
+        lines: LineSegments,
+        kinds: NDArray[np.intp],
+        points: VanishingPoints,
+        score: Scores,
+        dim: NDArray[np.bool_],
+        lab: Picture,
+        view: GroundView,
+        pose: Pose | None,
+    ) -> Borders:
+        primary = points.of(Role.PRIMARY)
+        if primary is None:
+            return Borders.none()
+        ends = lines.endpoints[kinds != LineKind.IRRELEVANT] * view.scale + (view.scale - 1.0) / 2.0
+        return self.kerbs.find(ends, points.directions[primary], score, dim, lab, view, pose)
 
     def _learn(self, lower: Picture, lab: Picture, view: GroundView, pose: Pose | None) -> str:
         """Learn the floor just before the robot; say so if it looks like no floor that is known.

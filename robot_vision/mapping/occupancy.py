@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,16 +31,18 @@ class OccupancyMap:
         limit: greatest amount of the log-odds: what changes must be seen to change.
         known: log-odds below which a cell is unknown.
         moved: way (m) or turn (rad) after which a picture tells something new: the same view counts once.
+        about: distance from the robot within which the floor begins that all free floor must hang together with, m.
     """
 
     size: float = 40.0
     resolution: float = 0.05
     free: float = 0.35
-    taken: float = 0.7
-    near: float = 4.0
+    taken: float = 0.6
+    near: float = 3.0
     limit: float = 4.0
     known: float = 0.6
     moved: tuple[float, float] = (0.02, 0.02)
+    about: float = 2.0
     _last: Pose | None = field(default=None, init=False, repr=False)
     _odds: LogOdds = field(init=False, repr=False)
     _corner: NDArray[np.int64] | None = field(default=None, init=False, repr=False)
@@ -116,13 +119,36 @@ class OccupancyMap:
             return None
         cells = np.full(self._odds.shape, UNKNOWN, np.int8)
         cells[self._odds > self.known] = OCCUPIED
-        cells[self._odds < -self.known] = FREE
+        cells[self._open_floor(self._odds < -self.known)] = FREE
         rows, columns = (np.flatnonzero((cells != UNKNOWN).any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return None
         cut = cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         low = (self._corner + (columns[0], rows[0])) * self.resolution
         return PlanView(np.ascontiguousarray(cut), self.resolution, (float(low[0]), float(low[1])))
+
+    def _open_floor(self, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """What of the free cells hangs together with the floor about the robot, by more than two cells everywhere.
+
+        What lies behind a kerb or a fence looks like floor, too, in pictures that do not show the fence well.
+        """
+        if self._last is None or self._corner is None:
+            return free
+        wide = cv2.morphologyEx(free.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        count, found = cv2.connectedComponents(wide, connectivity=4)
+        here = (
+            np.floor(np.array([self._last.x, self._last.y]) / self.resolution).astype(np.int64) - self._corner
+        )
+        reach = round(self.about / self.resolution)
+        low, high = np.maximum(here - reach, 0), here + reach + 1
+        near = np.unique(found[low[1] : high[1], low[0] : high[0]])
+        near = near[near > 0]
+        if not len(near):
+            return free
+        mine = near[np.argmax(np.bincount(found.ravel(), minlength=count)[near])]
+        return np.asarray(
+            free & (cv2.dilate((found == mine).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
+        )
 
     def _move(self, pose: Pose) -> NDArray[np.int64]:
         """Bring the window to the robot when it has come half way to its edge; returns the corner's cell."""

@@ -43,13 +43,16 @@ class Seen:
         reach: beyond which nothing is said, m from the camera.
         thickness: of the part behind the end of the floor that is taken for the thing that stands there, m.
         margin: before the end of the floor within which nothing is said, m: an edge is seen to about as much.
+        inside: behind the end of the floor up to which nothing is said, m: half a cell, all of which must lie
+            behind it.
     """
 
     boundary: Boundary
     view: GroundView
     reach: float
     thickness: float = 0.15
-    margin: float = 0.03
+    margin: float = 0.01
+    inside: float = 0.025
 
     def at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> Cells:
         """FREE, OCCUPIED or UNKNOWN for points x, y (m) in base_link, in any shape."""
@@ -62,9 +65,7 @@ class Seen:
         behind = away - self.boundary.distance[column]
         ended = self.boundary.ended[column]
         free = inside & (behind < np.where(ended, -self.margin, 0.0)) & (away < self.reach)
-        taken = (
-            inside & ended & (behind >= -self.margin / 2) & (behind < self.thickness) & (away < self.reach)
-        )
+        taken = inside & ended & (behind >= self.inside) & (behind < self.thickness) & (away < self.reach)
         cells = np.full(np.shape(x), UNKNOWN, np.int8)
         cells[free] = FREE
         cells[taken] = OCCUPIED

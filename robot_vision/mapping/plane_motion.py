@@ -227,7 +227,7 @@ def _flow(first: Gray, second: Gray, corners: Any) -> tuple[Any, Any]:
         first,
         second,
         corners,
-        None,  # type: ignore[call-overload]
+        None,  # type: ignore[call-overload]  # the places to begin at may be left out
         winSize=_WINDOW,
         maxLevel=1,
     )

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -164,3 +164,35 @@ def test_the_overlay_shows_every_stage_and_an_empty_one_where_nothing_is_known()
     dark = np.zeros((480, 640, 3), np.uint8)
     empty = draw_plan_view(dark, lines, mapper.update(dark, lines, None, CAMERA, 0.1))
     assert not empty[:240, 320:].any()
+
+
+@dataclass(frozen=True)
+class Fenced(Seen):
+    """Floor on both sides of a fence with a gap, all of it seen."""
+
+    gap: float = 0.0
+
+    def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        fence = (y > 0.8) & (y < 1.0) & (np.abs(x - 4.0) > 0.5 * self.gap)
+        return np.where(fence, OCCUPIED, FREE).astype(np.int8)
+
+
+@pytest.mark.parametrize(("gap", "joined"), [(0.0, False), (0.08, False), (0.6, True)])
+def test_floor_that_hangs_together_with_the_robots_only_by_a_crack_is_not_called_free(
+    gap: float, joined: bool
+) -> None:
+    seen = Fenced(wall_at(6.0), VIEW, 6.0, gap=gap)
+    grown = OccupancyMap()
+    grown.update(seen, Pose(0.0, 0.0, 0.0), trust=20.0)
+    grid = grown.grid()
+    assert grid is not None
+
+    def cell(x: float, y: float) -> int:
+        row, column = (
+            int((part - low) / grid.resolution) for part, low in zip((y, x), grid.origin[::-1], strict=True)
+        )
+        return int(grid.cells[row, column]) if row < grid.cells.shape[0] else UNKNOWN
+
+    assert cell(4.0, 0.0) == FREE
+    assert cell(3.0, 0.9) == OCCUPIED
+    assert cell(4.0, 1.5) == (FREE if joined else UNKNOWN)
