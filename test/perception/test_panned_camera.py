@@ -15,6 +15,7 @@ from winding_road import Bends, seen_road
 from robot_vision.geometry import Camera, attitude_from_up, rotation_from_rpy
 from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
+from robot_vision.perception.road.estimate import PITCH, ROLL
 from robot_vision.perception.road.tracker import RoadTracker
 
 RATE = 15
@@ -55,9 +56,15 @@ def test_heading_offset_and_attitude_hold_while_the_camera_pans(yaw: float) -> N
     assert math.degrees(np.abs(errors).max()) < 1.0
     offsets = [answer.lane.offset - 0.2 for answer in seen if answer.lane and answer.lane.offset_known]
     assert len(offsets) >= 20 and np.median(np.abs(offsets)) < 0.05
-    true_roll, true_pitch = attitude_from_up((rotation_from_rpy(*LEAN, 0.0) @ CAMERA.optical_to_base)[2])
-    told = np.array([(answer.attitude.roll, answer.attitude.pitch) for answer in seen if answer.attitude])
-    assert np.degrees(np.sqrt(np.mean((told - [true_roll, true_pitch]) ** 2, axis=0))).max() < 0.3
+    true = np.array(attitude_from_up((rotation_from_rpy(*LEAN, 0.0) @ CAMERA.optical_to_base)[2]))
+    attitudes = [answer.attitude for answer in seen if answer.attitude is not None]
+    misses = np.array([(attitude.roll, attitude.pitch) for attitude in attitudes]) - true
+    # Looking aside at one wall, its lines tell less of the roll, and the covariance says so.
+    assert np.degrees(np.sqrt(np.mean(misses**2, axis=0))).max() < 0.5
+    sure = [
+        miss @ np.linalg.solve(a.covariance, miss) / 2.0 for miss, a in zip(misses, attitudes, strict=True)
+    ]
+    assert np.mean(sure) < 2.0
 
 
 def test_a_pan_nobody_tells_of_would_be_taken_for_a_turn() -> None:
@@ -67,35 +74,34 @@ def test_a_pan_nobody_tells_of_would_be_taken_for_a_turn() -> None:
     assert lane is not None and math.degrees(lane.yaw) == pytest.approx(20.0, abs=1.5)
 
 
-def test_a_road_is_followed_while_the_camera_pans() -> None:
+@pytest.mark.parametrize("swing", [0.0, 20.0])
+def test_a_road_is_followed_while_the_camera_pans(swing: float) -> None:
+    """As well as with a camera that looks ahead."""
     bends, random, tracker = Bends(), np.random.default_rng(5), RoadTracker()
     errors, leans = [], []
-    course = bends.sharpest * bends.wavelength / (2.0 * np.pi)
-    before = None
-    for k, pan in enumerate(pans(math.radians(25.0), 90)):
+    course, before = bends.sharpest * bends.wavelength / (2.0 * np.pi), None
+
+    def heading(along: float) -> float:
+        return course * (1.0 - math.cos(2.0 * np.pi * along / bends.wavelength))
+
+    for k, pan in enumerate(pans(math.radians(swing), 75)):
         along = 5.0 + 6.0 * k / RATE
         camera = replace(ROAD_CAMERA, pan=pan)
-        heading = course * (1.0 - math.cos(2.0 * np.pi * along / bends.wavelength)) + 0.03
-        turn_rate = None if before is None else (heading - before) * RATE
-        before = heading
-        lines = seen_road(bends, along, -0.6, 0.03, random, leaning(camera, *LEAN))
+        turn_rate = None if before is None else (heading(along) - before) * RATE
+        before = heading(along)
+        lines = seen_road(bends, along, -0.6, 0.0, random, leaning(camera, *LEAN))
         road = tracker.update(lines, camera, k / RATE, 6.0, turn_rate)
         if road is not None and k >= 25:
-            ahead = road.bearings([10.0])[0][0]
-            truth = (
-                course * (1.0 - math.cos(2.0 * np.pi * (along + 10.0) / bends.wavelength)) + 0.03 - heading
-            )
-            errors.append(
-                [road.yaw - 0.03, ahead - truth - 0.03 + 0.03, road.curvature - bends.curvature(along)]
-            )
-            leans.append(road.state[3:5])
-    assert len(errors) >= 60
+            ahead = float(road.bearings([10.0])[0][0]) - (heading(along + 10.0) - heading(along))
+            errors.append([road.yaw, ahead, road.curvature - bends.curvature(along)])
+            leans.append(road.state[[ROLL, PITCH]])
+    assert len(errors) >= 45
     yaw, far, curvature = np.sqrt(np.mean(np.square(errors), axis=0))
-    assert math.degrees(yaw) < 0.6
-    assert math.degrees(far) < 1.5
+    assert math.degrees(yaw) < 0.5
+    assert math.degrees(far) < 1.0
     assert curvature < 0.1 * 2.0 * bends.sharpest
     true = attitude_from_up((rotation_from_rpy(*LEAN, 0.0) @ ROAD_CAMERA.optical_to_base)[2])
-    assert np.degrees(np.sqrt(np.mean((np.array(leans) - true) ** 2, axis=0))).max() < 0.6
+    assert np.degrees(np.sqrt(np.mean((np.array(leans) - true) ** 2, axis=0))).max() < 0.5
 
 
 def test_an_attitude_told_in_angles_is_the_same_wherever_the_head_looks() -> None:
