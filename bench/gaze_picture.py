@@ -20,7 +20,7 @@ from robot_vision.simulation.renderer import Renderer
 from robot_vision.simulation.sensors import CameraSensor
 from robot_vision.simulation.world import World
 
-SEED, AT_S = 101, 10.0
+SEED, AT_S = 101, 11.5
 ORANGE, BLUE, GREY = "#e07b00", "#1f6fb4", "#555555"
 SHOWN_M = 26.0
 
