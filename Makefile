@@ -56,7 +56,12 @@ $(STAMP): setup.py setup.cfg
 demo: $(STAMP)
 	@$(BIN)/robot-vision demo --out $(OUT)
 
-test: $(STAMP)
+# The viewer is large; only its tests and whoever looks at bags need it.
+$(VENV)/.viewer: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[viewer]'
+	@touch $@
+
+test: $(STAMP) $(VENV)/.viewer
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 lint: $(STAMP)

@@ -324,6 +324,29 @@ def record(
     _become("bag_recorder", {**settings, **({"topics": topics} if topics else {})})
 
 
+@app.command()
+def view(
+    bag: Annotated[Path, typer.Argument(help="The bag to show.")],
+    save: Annotated[
+        Optional[Path], typer.Option(help="Write a recording (.rrd) for the viewer instead of opening it.")
+    ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Show it in a browser, until Ctrl-C.")] = False,
+) -> None:
+    """Show a bag in the Rerun viewer: pictures, lines, plans, and what changes over time as curves."""
+    import signal
+
+    from robot_vision.viewer import Target, view
+
+    if web and save is not None:
+        raise typer.BadParameter("a file is not shown in a browser: choose --save or --web")
+    target = Target.BROWSER if web else Target.WINDOW if save is None else Target.FILE
+    with _progress("messages") as progress:
+        count = view(bag, target, save, progress)
+    typer.echo(f"{count} messages {f'in {save}' if save is not None else 'shown'}")
+    if web:
+        signal.sigwait({signal.SIGINT, signal.SIGTERM})
+
+
 def _become(node: str, parameters: dict[str, object]) -> NoReturn:
     """Let a node take the place of this process: signals and the exit code are its own."""
     import json

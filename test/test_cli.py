@@ -30,6 +30,7 @@ COMMANDS = {
     "centres",
     "bench",
     "doctor",
+    "view",
 }
 
 

@@ -36,6 +36,7 @@ FRONT_DOOR = {
     "demo": "cli",
     "doctor": "cli",
     "places": "cli",
+    "viewer": "cli",
 }  # modules beside the rooms that count as one of them
 FOUNDATION = {"places"}  # modules beside the rooms that know nobody, and that everybody may know
 WITH_ROS = {"ros", "nodes", "cli"}
@@ -55,6 +56,7 @@ ROS_PACKAGES = {
 }
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "common", "misc", "tools"}
 DISTRIBUTIONS = {
+    "rerun": "rerun-sdk",
     "cv2": "opencv-python-headless",
     "ruamel": "ruamel.yaml",
 }  # where the import and the requirement differ in name
@@ -261,9 +263,11 @@ def test_the_manifest_names_the_message_packages_that_are_used() -> None:
 
 
 def test_every_library_that_is_imported_is_declared() -> None:
-    required = {
-        re.split(r"[^\w.-]", line)[0] for line in lines_of(setup_cfg()["options"]["install_requires"])
-    }
+    declared = [
+        *lines_of(setup_cfg()["options"]["install_requires"]),
+        *lines_of(setup_cfg()["options.extras_require"]["viewer"]),
+    ]
+    required = {re.split(r"[^\w.-]", line)[0] for line in declared}
     used = {
         DISTRIBUTIONS.get(top(name), top(name))
         for path in modules()
