@@ -30,6 +30,7 @@ BENCHMARKS = {
     "attention": "what looking where it matters saves, and what it does to every score",
     "attitude": "roll and pitch of a body that leans by up to 3 degrees",
     "road": "heading and curvature on a winding road, 500 m of bends driven ten times",
+    "gaze": "a camera on a head that looks where look_at says, beside a fixed one",
     "plan_view": "plan and map of the floor: simulated drives, a real road, cost",
     "lines": "cost of finding lines, beside OpenCV's LSD",
     "costs": "cost against the number of lines and of pixels",

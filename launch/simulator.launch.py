@@ -29,6 +29,7 @@ ARGUMENTS = (
     ("yaw", "0.0", "start turned by so much, rad"),
     ("lean", "0.0", "greatest roll and pitch of the body, rad"),
     ("speed", "0.5", "of the steering, m/s"),
+    ("head", "false", "whether the camera sits on a head that look_at turns"),
     ("camera_height", "0.6", "of the world's camera, m: the simulator's log tells it"),
     ("camera_pitch", "0.0873", "of the world's camera, rad: the simulator's log tells it"),
     ("record", "", "a bag to record all topics into"),
@@ -70,6 +71,7 @@ def generate_launch_description() -> LaunchDescription:
             "start.offset": given_as("offset"),
             "start.yaw": given_as("yaw"),
             "lean": given_as("lean"),
+            "head.on": given_as("head", bool),
             "wait_timeout": PATIENCE_S,
         },
     )

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -301,6 +301,17 @@ def imu(
         angular_velocity_covariance=absent,
         linear_acceleration=vector3((0.0, 0.0, 0.0)),
         linear_acceleration_covariance=absent.copy(),
+    )
+
+
+def joint_state(stamp_ns: int, positions: Mapping[str, float]) -> Any:
+    """Build a sensor_msgs/JointState of joints by name, rad; velocities and efforts are not told."""
+    return message_class("sensor_msgs/msg/JointState")(
+        header=header(stamp_ns, ""),
+        name=list(positions),
+        position=_floats(list(positions.values())),
+        velocity=np.zeros(0),
+        effort=np.zeros(0),
     )
 
 

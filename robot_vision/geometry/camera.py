@@ -49,6 +49,8 @@ class Camera:
         focal_known: False when fx and fy are only a guess.
         rectification: rotation (3, 3) from the raw to the rectified frame, CameraInfo `r`; None for none.
         projection: (3, 4) of the rectified picture, CameraInfo `p`; None when it is the raw camera's own.
+        pan: of the head that carries the camera (rad), about base_link's z, > 0 to the left; 0 without a head.
+        tilt: of that head (rad), on top of `pitch`, > 0 looks down.
 
     Raises:
         CameraError: naming the field and the reason, for values no camera can have.
@@ -69,6 +71,8 @@ class Camera:
     focal_known: bool = True
     rectification: Sequence[Sequence[float]] | FloatArray | None = None
     projection: Sequence[Sequence[float]] | FloatArray | None = None
+    pan: float = 0.0
+    tilt: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field and bring it to plain floats and tuples, so that cameras compare and hash."""
@@ -78,7 +82,7 @@ class Camera:
             self._set(name, checked_focal_length(name, getattr(self, name)))
         for name in ("cx", "cy", "x_m"):
             self._set(name, checked_number(name, getattr(self, name)))
-        for name in ("pitch", "roll"):
+        for name in ("pitch", "roll", "pan", "tilt"):
             self._set(name, checked_angle(name, getattr(self, name)))
         check_principal_point("cx", self.cx, self.fx, "width", self.width)
         check_principal_point("cy", self.cy, self.fy, "height", self.height)
@@ -172,9 +176,20 @@ class Camera:
 
     @property
     def optical_to_base(self) -> FloatArray:
-        """Rotation (3, 3) from the optical frame to base_link: Ry(pitch) Rx(roll) B."""
-        rotation: FloatArray = rotation_from_rpy(self.roll, self.pitch, 0.0) @ BODY_FROM_OPTICAL
+        """Rotation (3, 3) from the optical frame to base_link: Rz(pan) Ry(pitch + tilt) Rx(roll) B."""
+        rotation: FloatArray = (
+            rotation_from_rpy(self.roll, self.pitch + self.tilt, self.pan) @ BODY_FROM_OPTICAL
+        )
         return rotation
+
+    @property
+    def head_turn(self) -> FloatArray:
+        """Rotation (3, 3) from the optical frame to where that frame lies while the head looks straight ahead."""
+        if self.pan == 0.0 and self.tilt == 0.0:
+            return np.eye(3)
+        ahead = rotation_from_rpy(self.roll, self.pitch, 0.0) @ BODY_FROM_OPTICAL
+        turn: FloatArray = ahead.T @ self.optical_to_base
+        return turn
 
     def rectified(self) -> Camera:
         """The camera of the rectified picture: undistorted, unrotated, the matrix of P, or K without a P."""

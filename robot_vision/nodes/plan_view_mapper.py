@@ -14,7 +14,7 @@ from typing import Any
 
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, Range
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2, Range
 from std_msgs.msg import Header
 
 from robot_vision.geometry import Camera
@@ -25,6 +25,7 @@ from robot_vision.perception import LineSegments, VanishingPoints
 from robot_vision.ros import calibration, floor_messages, messages, qos
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
+from robot_vision.ros.head import Head
 from robot_vision.ros.images import MESSAGES, TOPICS, Rectifier, image_message
 from robot_vision.ros.join import ExactJoin
 from robot_vision.ros.node import VisionNode, stamp_ns
@@ -78,6 +79,7 @@ class PlanViewMapperNode(VisionNode):
         self._calibration = Calibration(camera_place(self.settings))
         self._rectifier = Rectifier()
         self._poses = PoseHistory()
+        self._head = Head()
         self._odom_frame, self._pitches = "odom", False
         self._last: tuple[float, float | None] = (0.0, None)
         self._map_said_ns: int | None = None
@@ -89,6 +91,7 @@ class PlanViewMapperNode(VisionNode):
         self._overlay = self.say(Image, "plan_view/overlay", qos.ANSWER)
         self._camera_info = self.hear(CameraInfo, "camera_info", self._calibration.take, qos.SENSOR)
         self._odom = self.hear(Odometry, "odom", self._hear_odom, qos.ODOMETRY)
+        self._joints = self.hear(JointState, "joint_states", self._head.take, qos.ODOMETRY)
         transport = self.settings["transport"]
         self._topic = TOPICS[transport]
         self._join: ExactJoin[Any] = ExactJoin((self._topic, "lines", "vanishing_points"), self._keep_newest)
@@ -117,6 +120,7 @@ class PlanViewMapperNode(VisionNode):
         """Forget what earlier pictures and odometry told, the map too."""
         self._mapper.reset()
         self._poses.clear()
+        self._head.clear()
         self._join.reset()
         self._waiting = None
         self._last, self._map_said_ns = (0.0, None), None
@@ -164,7 +168,8 @@ class PlanViewMapperNode(VisionNode):
             return
         self._busy = True
         try:
-            for subscription in (self._lines_heard, self._points_heard, self._odom, self._camera_info):
+            told = (self._lines_heard, self._points_heard, self._odom, self._camera_info, self._joints)
+            for subscription in told:
                 self.catch_up(subscription)
             task, self._waiting = self._waiting, None
             if task is not None:
@@ -179,6 +184,11 @@ class PlanViewMapperNode(VisionNode):
         header = task.picture.header
         camera = self._usable_camera()
         if camera is None:
+            return
+        try:
+            self._head.check_straight(camera, 1e-9 * stamp_ns(header.stamp))
+        except messages.MessageError as cause:
+            self.complain("joint_states", str(cause), "give the plan a camera that is fixed to the robot")
             return
         self._rectifier.use(camera)
         picture = self._rectifier.colour(task.picture)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives a vehicle through a simulated world as `steering` says, and shows the graph what its camera sees.
 
+With `head.on` the camera sits on a head that turns to where `look_at` says, and says how it stands on `joint_states`;
+in lockstep each picture then waits for its `look_at` too, where somebody says it.
+
 Lockstep: the world stands still from a picture until the `steering` with the stamp of that picture has come.
 What belongs to a picture (odometry up to it, /clock, calibration, truth) is sent before it, and its receipt by
 every reliable subscriber is waited for, so that the same seed gives the same drive on a slow machine as on
@@ -17,7 +20,7 @@ import time
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import PointStamped, TwistStamped
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -27,15 +30,17 @@ from robot_vision.bags.messages import stamp_ns
 from robot_vision.nodes.bag_player import message_type
 from robot_vision.ros.diagnostics import TOPIC as DIAGNOSTICS
 from robot_vision.ros.diagnostics import Level
+from robot_vision.ros.head import point_from_message
 from robot_vision.ros.node import VisionNode
 from robot_vision.ros.parameters import ParameterError, Setting
-from robot_vision.ros.qos import ANSWER, EVERY
+from robot_vision.ros.qos import ANSWER, EVERY, NEWEST
 from robot_vision.ros.readiness import AwaitedNodes
 from robot_vision.ros.run import run_node
 from robot_vision.simulation import sensed
 from robot_vision.simulation.asked import split_settings
 from robot_vision.simulation.drive import VEHICLES
 from robot_vision.simulation.errors import SimulationError
+from robot_vision.simulation.head import HeadSettings
 from robot_vision.simulation.live import STANDING, LiveDrive, LiveSettings, OdometryAt
 from robot_vision.simulation.record import START_NS, build_world
 from robot_vision.simulation.sensed import PictureFormat
@@ -93,6 +98,10 @@ class Simulator(VisionNode):
         ),
         Setting("roughness", 0.0, "standard deviation of the ground's height, m", 0.0, 0.2, live=False),
         Setting("noise", 1.0, "factor on the noise of camera and wheels; 0: none", 0.0, 20.0, live=False),
+        Setting("head.on", False, "whether look_at turns the camera, on a pan-tilt head", live=False),
+        Setting("head.most_pan", 1.2, "of that head to either side, rad", 0.01, 3.1, live=False),
+        Setting("head.rate", 2.0, "greatest of its joints, rad/s", 0.01, 100.0, live=False),
+        Setting("head.lag", 0.08, "time constant of its servos, s", 0.0, 5.0, live=False),
         Setting("settling", 5.0, "way that does not count for the offset's RMS, m", 0.0, 1e6, live=False),
         Setting("wait_for_nodes", [""], "nodes whose diagnostics must say that they are ready", live=False),
         Setting("wait_timeout", 10.0, "how long to wait for those who listen, s", 0.0, 1e6, live=False),
@@ -110,11 +119,14 @@ class Simulator(VisionNode):
         self._advertise()
         self._states = self.create_publisher(DiagnosticArray, DIAGNOSTICS, QoSProfile(depth=10))
         self._steering = self.hear(TwistStamped, "steering", self._hear_steering, EVERY)
+        head = self._drive.head is not None
+        self._looks = self.hear(PointStamped, "look_at", self._hear_look_at, NEWEST) if head else None
         self._awaited_nodes = AwaitedNodes(self, given["wait_for_nodes"])
         self._known: dict[str, int] = {}
         self._settled = 0
         self._begun = self._ended = False
         self._awaited_ns: int | None = None
+        self._awaited_topics: set[str] = set()
         self._pictures = self._unanswered = 0
         self._told_ns = -TELL_EVERY_NS
         self._began_at = 0.0
@@ -143,6 +155,7 @@ class Simulator(VisionNode):
             "odom": "nav_msgs/msg/Odometry",
             "camera_info": "sensor_msgs/msg/CameraInfo",
             self._format.topic: self._format.type_name,
+            **({"joint_states": "sensor_msgs/msg/JointState"} if self._drive.head is not None else {}),
         }
         state, now = self._drive.state, START_NS
         lasting = {said.topic: said.type_name for said in self._teller.lasting(now)}
@@ -201,14 +214,25 @@ class Simulator(VisionNode):
         if stamp == 0:  # of a person's hand, not of a picture
             stamp = START_NS + self._drive.time_ns
         self._drive.steer(message.twist.linear.x, message.twist.angular.z, stamp - START_NS)
+        self._answered("steering", stamp)
+
+    def _hear_look_at(self, message: PointStamped) -> None:
+        if self._drive.head is not None and self._begun and not self._ended:
+            self._drive.head.look_at(point_from_message(message))
+            self._answered("look_at", stamp_ns(message))
+
+    def _answered(self, topic: str, stamp: int) -> None:
         if self._lockstep and stamp == self._awaited_ns:
-            self._go_on()
+            self._awaited_topics.discard(topic)
+            if not self._awaited_topics:
+                self._go_on()
 
     def _time_is_over(self) -> None:
         """In lockstep: no steering came in time. Else: the next picture is due."""
         if self._lockstep:
             self._unanswered += 1
-            waited = f"no steering to the picture at {self._drive.time_ns / 1e9:.2f} s came within "
+            missing = " and no ".join(sorted(self._awaited_topics)) or "steering"
+            waited = f"no {missing} to the picture at {self._drive.time_ns / 1e9:.2f} s came within "
             will = "drives on with the last command" if self._drive.obeys else "stands"
             self.complain("steering", f"{waited}{self.settings['lockstep_timeout']:g} s; the vehicle {will}")
         self._go_on()
@@ -238,12 +262,16 @@ class Simulator(VisionNode):
         if not readings or readings[-1].time_ns != self._drive.time_ns:
             self._say_clock(self._drive.time_ns)
         self._say(sensed.camera_info(now, self._drive.world.camera))
+        if self._drive.head is not None:
+            self._say(sensed.head_joints(now, self._drive.camera))
         for said in self._teller.at(now, self._drive.state):
             self._say(said)
         began = time.perf_counter()
         picture = self._format.say(now, self._drive.picture())
         self.diagnostics.processing_ms = 1e3 * (time.perf_counter() - began)
-        self._awaited_ns = now
+        self._awaited_ns, self._awaited_topics = now, {"steering"}
+        if self._looks is not None and self._looks.get_publisher_count():
+            self._awaited_topics.add("look_at")
         self._outputs[picture.topic].publish(encode(picture.message))
         self._pictures += 1
         self.diagnostics.answered += 1
@@ -337,6 +365,9 @@ def _live_settings(given: dict[str, Any], usual_speed: float) -> LiveSettings:
         settling=given["settling"],
         width=given["width"] or None,
         length=given["length"] or None,
+        head=HeadSettings(given["head.most_pan"], rate=given["head.rate"], lag=given["head.lag"])
+        if given["head.on"]
+        else None,
     )
 
 

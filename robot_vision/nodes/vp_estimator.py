@@ -11,9 +11,9 @@ import math
 import time
 from typing import Any
 
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PointStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
-from sensor_msgs.msg import CameraInfo, Imu, PointCloud2, RegionOfInterest
+from sensor_msgs.msg import CameraInfo, Imu, JointState, PointCloud2, RegionOfInterest
 from std_msgs.msg import Header
 
 from robot_vision.perception.attention import Attention
@@ -24,6 +24,7 @@ from robot_vision.ros import calibration, messages, qos
 from robot_vision.ros.attention import region_to_message
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
+from robot_vision.ros.head import Head, point_to_message
 from robot_vision.ros.node import VisionNode, stamp_ns
 from robot_vision.ros.parameters import CAMERA_PLACE, Setting, camera_place
 from robot_vision.ros.run import run_node
@@ -34,7 +35,7 @@ NO_WAY_ADVICE = "look whether the camera sees straight edges that lead ahead"
 
 
 class VpEstimatorNode(VisionNode):
-    """`lines`, `camera_info`, `odom` to `vanishing_points`, `heading`, `attitude`, `path_ahead`, `attention`."""
+    """`lines`, `camera_info`, `odom`, `joint_states` to what they tell of the way, and where to look next."""
 
     SETTINGS = (
         *CAMERA_PLACE,
@@ -48,6 +49,9 @@ class VpEstimatorNode(VisionNode):
         Setting("attention.enabled", False, "say on attention where lines are to be looked for next"),
         Setting("attention.every", 15, "pictures from one look at the whole picture to the next", 1, 10_000),
         Setting("path_length", 10.0, "length of path_ahead, m; on a road at most 36", 1.0, 100.0),
+        Setting("look_at.most_pan", 1.0, "how far to either side look_at may lead, rad", 0.05, 1.5),
+        Setting("look_at.rate", 1.5, "how fast look_at may turn, rad/s", 0.05, 20.0),
+        Setting("look_at.ahead", 15.0, "how far the way counts for look_at, m", 1.0, 30.0),
     )
 
     def __init__(self) -> None:
@@ -55,14 +59,17 @@ class VpEstimatorNode(VisionNode):
         self._estimator = WayEstimator()
         self._calibration = Calibration(camera_place(self.settings))
         self._motion = MotionHistory()
+        self._head = Head()
         self._last_s: float | None = None
         self._vanishing_points = self.say(PointCloud2, "vanishing_points", qos.ANSWER)
         self._heading = self.say(PoseWithCovarianceStamped, "heading", qos.ANSWER, awaited=True)
         self._attitude = self.say(Imu, "attitude", qos.ANSWER)
         self._path = self.say(Path, "path_ahead", qos.ANSWER)
         self._attention = self.say(RegionOfInterest, "attention", qos.ANSWER)
+        self._look_at = self.say(PointStamped, "look_at", qos.ANSWER)
         self._camera_info = self.hear(CameraInfo, "camera_info", self._hear_camera_info, qos.SENSOR)
         self._odom = self.hear(Odometry, "odom", self._hear_odom, qos.ODOMETRY)
+        self._joints = self.hear(JointState, "joint_states", self._head.take, qos.ODOMETRY)
         self.hear(PointCloud2, "lines", self._hear_lines, qos.NEWEST, required=True, picture=True)
         self.use_settings()
 
@@ -74,6 +81,9 @@ class VpEstimatorNode(VisionNode):
         self._estimator.kind = Kind(values["way"])
         self._estimator.path_length = values["path_length"]
         self._attend(values["attention.enabled"], values["attention.every"])
+        gaze = self._estimator.gaze
+        gaze.most_pan, gaze.rate = values["look_at.most_pan"], values["look_at.rate"]
+        gaze.ahead = values["look_at.ahead"]
         self._estimator.set_lean(values["lean"])
         self._estimator.set_widths(values["lane.narrowest"], values["lane.widest"])
 
@@ -95,6 +105,7 @@ class VpEstimatorNode(VisionNode):
         """Forget what earlier pictures and odometry told."""
         self._estimator.reset()
         self._motion.clear()
+        self._head.clear()
         self._last_s = None
 
     def _hear_camera_info(self, message: CameraInfo) -> None:
@@ -112,6 +123,7 @@ class VpEstimatorNode(VisionNode):
         self.follow_time("lines", message.header.stamp)
         self.catch_up(self._camera_info)
         self.catch_up(self._odom)
+        self.catch_up(self._joints)
         try:
             lines = messages.lines_from_message(message)
         except messages.MessageError as cause:
@@ -125,6 +137,12 @@ class VpEstimatorNode(VisionNode):
             self._say_vanishing_points(message.header, None)
             return
         now_s = 1e-9 * stamp_ns(message.header.stamp)
+        try:
+            camera = self._head.turned(camera, now_s)
+        except messages.MessageError as cause:
+            self.complain("joint_states", str(cause), "publish joint_states with every picture, or at 20 Hz")
+            self._say_vanishing_points(message.header, None)
+            return
         since_s = now_s if self._last_s is None else self._last_s
         speed, turn_rate = self._motion.mean(since_s, now_s)
         self._last_s = now_s
@@ -135,6 +153,7 @@ class VpEstimatorNode(VisionNode):
             self._say_vanishing_points(message.header, None)
             raise
         self._say(message.header, estimate)
+        self._say_where_to_look(message.header)
         self.answered(message.header.stamp, began)
 
     def _say(self, header: Header, estimate: WayEstimate) -> None:
@@ -159,6 +178,12 @@ class VpEstimatorNode(VisionNode):
         else:
             known = f"knows heading and offset in a {estimate.frame}"
             self.diagnostics.report(Level.OK, estimate.reason or known)
+
+    def _say_where_to_look(self, header: Header) -> None:
+        """After all else: nobody who steers waits for it."""
+        gaze = self._estimator.look() if self._look_at.get_subscription_count() else None
+        if gaze is not None:
+            self._look_at.publish(point_to_message(header, gaze.point))
 
     def _lean(self, estimate: WayEstimate) -> Lean | None:
         """Lean of the robot, where the picture tells of it."""

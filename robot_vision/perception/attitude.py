@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.geometry import attitude_from_up, up_from_attitude
+from robot_vision.geometry import Camera, attitude_from_up, up_from_attitude
 from robot_vision.geometry.sphere import local_coordinates, retract, tangent_basis
 from robot_vision.perception.vanishing import Role, VanishingPoints
 
@@ -21,7 +21,7 @@ _CLEAR = 15.0
 
 @dataclass(frozen=True)
 class Attitude:
-    """Lean of the camera body.
+    """Lean of the camera body, as it is while a head that carries it looks straight ahead.
 
     Attributes:
         roll: left side up positive, rad.
@@ -40,10 +40,13 @@ class Attitude:
     seen: bool
 
     @classmethod
-    def from_angles(cls, roll: float, pitch: float, covariance: Array) -> Attitude:
-        """One that a picture told as roll and pitch (rad) with their covariance (2, 2)."""
-        up = up_from_attitude(roll, pitch)
-        jacobian = tangent_of_attitude(up, roll, pitch)
+    def from_angles(
+        cls, roll: float, pitch: float, covariance: Array, camera: Camera | None = None
+    ) -> Attitude:
+        """One told as roll and pitch (rad) with their covariance (2, 2) by a picture of `camera`, wherever it looks."""
+        turn = np.eye(3) if camera is None else camera.head_turn
+        up = turn.T @ up_from_attitude(roll, pitch)
+        jacobian = tangent_basis(up) @ turn.T @ _swings_of_up(roll, pitch)
         return cls(roll, pitch, covariance, up, jacobian @ covariance @ jacobian.T, True)
 
 
@@ -108,9 +111,9 @@ def estimate_attitude(
             pull = pull + own @ local_coordinates(up, direction)
         up = retract(up, np.asarray(np.linalg.solve(information, pull), dtype=np.float64))
     up_covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    roll, pitch = attitude_from_up(up)
-    jacobian = tangent_of_attitude(up, roll, pitch)
-    inverse = np.linalg.inv(jacobian)
+    turn = points.camera.head_turn
+    roll, pitch = attitude_from_up(turn @ up)
+    inverse = np.linalg.inv(tangent_basis(up) @ turn.T @ _swings_of_up(roll, pitch))
     telling = np.isin(points.roles, [Role.PRIMARY, Role.VERTICAL, Role.HORIZONTAL])
     seen = bool(np.any(telling & (points.weight > 0.0)))
     covariance = np.asarray(inverse @ up_covariance @ inverse.T, dtype=np.float64)
@@ -130,10 +133,15 @@ def _vertical(points: VanishingPoints, picture: VanishingPoints | None) -> tuple
 
 
 def tangent_of_attitude(up: Array, roll: float, pitch: float) -> Array:
-    """How `up` moves in its tangent plane with roll and pitch: (2, 2), by central differences."""
+    """How `up` moves in its tangent plane with roll and pitch of a camera without a head: (2, 2)."""
+    return np.asarray(tangent_basis(up) @ _swings_of_up(roll, pitch))
+
+
+def _swings_of_up(roll: float, pitch: float) -> Array:
+    """How the vertical moves in the optical frame with roll and pitch: (3, 2), by central differences."""
     step = 1e-6
     columns = [
         (up_from_attitude(roll + step, pitch) - up_from_attitude(roll - step, pitch)) / (2.0 * step),
         (up_from_attitude(roll, pitch + step) - up_from_attitude(roll, pitch - step)) / (2.0 * step),
     ]
-    return np.asarray(tangent_basis(up) @ np.stack(columns, axis=1))
+    return np.stack(columns, axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.perception.attention import Attention
 from robot_vision.perception.attitude import Attitude
+from robot_vision.perception.gaze import Gaze, GazePlanner
 from robot_vision.perception.heading import HeadingEstimate, HeadingEstimator
 from robot_vision.perception.lane import LaneHeading
 from robot_vision.perception.region import Region
@@ -67,6 +69,16 @@ class WayEstimate:
     attention: Region | None = None
 
 
+class _Newest(NamedTuple):
+    """The newest picture: what it told, its camera and time (s), how the robot moved (m/s, rad/s)."""
+
+    found: WayEstimate
+    camera: Camera
+    stamp_s: float
+    speed: float | None
+    turn_rate: float | None
+
+
 @dataclass
 class WayEstimator:
     """Follows the way through successive pictures.
@@ -75,6 +87,7 @@ class WayEstimator:
         kind: of way.
         corridor: follows vanishing points and a lane between walls.
         road: follows a road.
+        gaze: chooses where to look next.
         path_length: of the path given, m.
         attention: chooses where to look in the next picture; None: everywhere, always. With it, `update` takes lines
             to come from where it has asked for them.
@@ -83,8 +96,10 @@ class WayEstimator:
     kind: Kind = Kind.AUTO
     corridor: HeadingEstimator = field(default_factory=HeadingEstimator)
     road: RoadTracker = field(default_factory=RoadTracker)
+    gaze: GazePlanner = field(default_factory=GazePlanner)
     path_length: float = 10.0
     attention: Attention | None = None
+    _newest: _Newest | None = field(default=None, init=False, repr=False, compare=False)
     _walled: bool | None = field(default=None, init=False, repr=False, compare=False)
     _contrary_since: float | None = field(default=None, init=False, repr=False, compare=False)
     _road_seen: float | None = field(default=None, init=False, repr=False, compare=False)
@@ -109,6 +124,8 @@ class WayEstimator:
         self.road.reset()
         if self.attention is not None:
             self.attention.reset()
+        self.gaze.reset()
+        self._newest = None
         self._walled = self._contrary_since = self._road_seen = None
 
     def update(
@@ -128,13 +145,27 @@ class WayEstimator:
             speed: of the robot, m/s, None when unknown.
             turn_rate: of the robot, rad/s counter-clockwise, None when unknown.
         """
-        estimate = self._estimate(lines, camera.rectified(), stamp_s, speed, turn_rate)
-        if self.attention is None:
-            return estimate
-        points, attitude = estimate.vanishing_points, estimate.attitude
-        return replace(estimate, attention=self.attention.update(lines, points, attitude, stamp_s, turn_rate))
+        camera = camera.rectified()
+        found = self._find(lines, camera, stamp_s, speed, turn_rate)
+        if self.attention is not None:
+            points, attitude = found.vanishing_points, found.attitude
+            region = self.attention.update(lines, points, attitude, stamp_s, turn_rate)
+            found = replace(found, attention=region)
+        self._newest = _Newest(found, camera, stamp_s, speed, turn_rate)
+        return found
 
-    def _estimate(
+    def look(self) -> Gaze | None:
+        """Where a head that carries the camera should look next, after the newest picture.
+
+        Asked after a picture or not at all: nobody pays for it where no head turns the camera. None before the first
+        picture, and where height or focal length of the camera is not known.
+        """
+        if self._newest is None:
+            return None
+        found, camera, stamp_s, speed, turn_rate = self._newest
+        return self.gaze.update(found.lane, found.road, camera, stamp_s, speed, turn_rate)
+
+    def _find(
         self,
         lines: LineSegments,
         camera: Camera,
@@ -196,7 +227,7 @@ class WayEstimator:
             vanishing_sequence(road, camera, lines),
             road.lane,
             road.path(along),
-            attitude_on(road),
+            attitude_on(road, camera),
             road,
             "",
         )

@@ -10,10 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_vision.geometry import Camera
 from robot_vision.simulation.body import BodyState, RoughGround, Sway
 from robot_vision.simulation.drive import STEPS_PER_SECOND
 from robot_vision.simulation.errors import SimulationError
 from robot_vision.simulation.floor_plan import Room, Surroundings
+from robot_vision.simulation.head import Head, HeadSettings
 from robot_vision.simulation.lane import LanePose
 from robot_vision.simulation.odometry import Odometer, Reading
 from robot_vision.simulation.record import END_GAP, ODOMETRY_RATE
@@ -50,6 +52,7 @@ class LiveSettings:
         settling: metres of way that do not count for the score, in which the start is steered out.
         width: of the robot, metres; None: as the world has it.
         length: likewise.
+        head: that turns the camera; None: the camera is fixed to the body.
     """
 
     rate: int = 15
@@ -64,6 +67,7 @@ class LiveSettings:
     settling: float = 5.0
     width: float | None = None
     length: float | None = None
+    head: HeadSettings | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.rate <= 60 or STEPS_PER_SECOND % self.rate:
@@ -109,6 +113,7 @@ class LiveDrive:
 
     Attributes:
         score: how it went so far.
+        head: that turns the camera; None where it is fixed.
     """
 
     def __init__(self, world: World, settings: LiveSettings | None = None, seed: int = 0) -> None:
@@ -127,6 +132,7 @@ class LiveDrive:
         random = np.random.default_rng((seed, 8))
         self._sways = [Sway.draw(random, how.lean) for _ in range(2)]
         self._ground = RoughGround(how.roughness, seed)
+        self.head = None if how.head is None else Head(how.head, world.camera)
         self._renderer = Renderer(world.scene, world.camera)
         usual = CameraSensor()
         self._sensor = CameraSensor(
@@ -168,6 +174,11 @@ class LiveDrive:
         )
 
     @property
+    def camera(self) -> Camera:
+        """The camera as it looks now."""
+        return self.world.camera if self.head is None else self.head.camera
+
+    @property
     def in_contact(self) -> bool:
         """Whether the robot leans on something."""
         return self._in_contact
@@ -188,7 +199,7 @@ class LiveDrive:
 
     def picture(self) -> NDArray[np.uint8]:
         """What the camera takes now, uint8 (H, W, 3) BGR; once a moment: each has noise of its own."""
-        light = self._renderer.render(self.state.camera_pose(self.world.camera))
+        light = self._renderer.render(self.state.camera_pose(self.camera))
         self._clouds.dim(light, self._step / STEPS_PER_SECOND)
         return self._sensor.capture(light)
 
@@ -257,6 +268,8 @@ class LiveDrive:
         speed, turn_rate = (command.speed, command.turn_rate) if command else (0.0, 0.0)
         vehicle = self._vehicle
         vehicle.step(speed, turn_rate, 1 / STEPS_PER_SECOND)
+        if self.head is not None:
+            self.head.step(1 / STEPS_PER_SECOND)
         self._step += 1
         self._rolled += vehicle.speed / STEPS_PER_SECOND
         self._turned += vehicle.turn_rate / STEPS_PER_SECOND

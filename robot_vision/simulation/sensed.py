@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
+from robot_vision.simulation.head import JOINTS
 from robot_vision.simulation.odometry import Reading
 from robot_vision.simulation.truth import Said
 
@@ -48,6 +49,14 @@ def camera_info(stamp_ns: int, camera: Camera) -> Said:
 
     message = messages.camera_info(stamp_ns, OPTICAL_FRAME, camera)
     return Said("camera_info", "sensor_msgs/msg/CameraInfo", message)
+
+
+def head_joints(stamp_ns: int, camera: Camera) -> Said:
+    """How the head that carries the camera stands."""
+    from robot_vision.bags import messages
+
+    message = messages.joint_state(stamp_ns, dict(zip(JOINTS, (camera.pan, camera.tilt), strict=True)))
+    return Said("joint_states", "sensor_msgs/msg/JointState", message)
 
 
 def odometry(stamp_ns: int, reading: Reading) -> Said:

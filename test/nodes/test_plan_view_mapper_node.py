@@ -15,7 +15,7 @@ import pytest
 from nav_msgs.msg import OccupancyGrid, Odometry
 from node_bench import NodeBench
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2, Range
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2, Range
 from std_msgs.msg import Header
 
 from robot_vision.ros.images import image_message
@@ -41,6 +41,7 @@ def bench(ros_domain: int) -> Iterator[NodeBench]:
             (PointCloud2, "vanishing_points"),
             (CameraInfo, "camera_info"),
             (Odometry, "odom"),
+            (JointState, "joint_states"),
         ):
             bench.speaks(kind, topic)
         for kind, topic in (
@@ -213,3 +214,17 @@ def test_a_clock_that_jumps_back_starts_anew(calibrated: NodeBench) -> None:
     header = show(calibrated, picture(0.0, BOX))
     calibrated.log_line("/image", "went back")
     assert calibrated.answer("clearance", header).range == pytest.approx(2.7, rel=0.04)
+
+
+def test_a_camera_on_a_head_that_looks_aside_gives_no_plan(calibrated: NodeBench) -> None:
+    """Of a head that turns back the plan goes on."""
+    for pan, aside in ((0.3, True), (0.0, False)):
+        joints = JointState(header=calibrated.header(step_ns=STEP_NS), name=["camera_pan"], position=[pan])
+        calibrated.say_surely("joint_states", joints)
+        calibrated.next_stamp(-STEP_NS)
+        header = show(calibrated, picture(0.0, BOX))
+        if aside:
+            calibrated.log_line("/joint_states", "looks aside (pan 0.30 rad")
+        else:
+            calibrated.answer("clearance", header)
+    assert calibrated.log_count("looks aside") == 1

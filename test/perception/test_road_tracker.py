@@ -191,7 +191,7 @@ def test_the_sequence_moves_along_the_vanishing_line() -> None:
     ]
     spread = np.sqrt(np.trace(np.cov(np.array(moved).T)))
     assert spread == pytest.approx(np.sqrt(np.trace(points.covariance[0])), rel=0.15)
-    assert attitude_on(road).pitch == road.state[PITCH]
+    assert attitude_on(road, CAMERA).pitch == road.state[PITCH]
 
 
 def test_what_is_no_road_is_none() -> None:

@@ -66,7 +66,9 @@ class ChordReader:
 
     def _cut(self, camera: Camera, ends: Array) -> Array:
         """Move the farther ends (N, 2, 2) px nearer where they lie beyond `farthest`, for the camera as mounted."""
-        turned = _rays(camera, ends) @ camera.optical_to_base.T
+        turned = (
+            _rays(camera, ends) @ (rotation_from_rpy(camera.roll, camera.pitch, 0.0) @ BODY_FROM_OPTICAL).T
+        )
         # Both the forward part of a ray and its fall are linear along a segment, and so is what tells the far side.
         beyond = turned[..., 0] * self._height + turned[..., 2] * (self._farthest - self._ahead)
         cut = np.array(ends)
@@ -112,8 +114,12 @@ class ChordReader:
 
 
 def _rays(camera: Camera, pixels: Array) -> Array:
-    """Rays (…, 3) of pixels (…, 2) of a rectified picture, each as long as its depth is 1."""
-    return np.concatenate(
+    """Rays (…, 3) of pixels (…, 2) of a rectified picture, each as long as its depth is 1.
+
+    They are told in the optical frame as it lies while the head looks straight ahead, wherever it looks.
+    """
+    rays = np.concatenate(
         [(pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy), np.ones((*pixels.shape[:-1], 1))],
         axis=-1,
     )
+    return rays if camera.pan == 0.0 == camera.tilt else np.asarray(rays @ camera.head_turn.T)

@@ -114,7 +114,7 @@ class RoadFilter:
         away -= [0.0, found.offset]
         cos, sin = np.cos(found.yaw), np.sin(found.yaw)
         points = np.stack([cos * away[:, 0] + sin * away[:, 1], cos * away[:, 1] - sin * away[:, 0]], axis=1)
-        leaning = _leaning(points - [camera.x_m, 0.0], camera.height_m)
+        leaning = leaning_on_ground(points - [camera.x_m, 0.0], camera.height_m)
         before, doubt = self._kalman.x, self._kalman.P
         for _ in range(_ROUNDS):
             state = self.state
@@ -216,7 +216,7 @@ class RoadFilter:
         return chords, borders
 
 
-def _leaning(points: Array, height: float) -> Array:
+def leaning_on_ground(points: Array, height: float) -> Array:
     """How ground points (N, 2) under given rays move with roll and pitch of a level camera, (N, 2, 2) m/rad."""
     x, y = points.T
     by_roll = np.stack([x * y / height, height + y**2 / height], axis=1)

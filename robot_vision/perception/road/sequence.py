@@ -33,7 +33,7 @@ def vanishing_sequence(road: RoadEstimate, camera: Camera, lines: int) -> Vanish
     level = np.stack([np.cos(bearing), np.sin(bearing), np.zeros(len(ways))], axis=1)
     sideways = np.stack([-np.sin(bearing), np.cos(bearing), np.zeros(len(ways))], axis=1)
     roll, pitch = float(road.state[ROLL]), float(road.state[PITCH])
-    to_optical = (rotation_from_rpy(roll, pitch, 0.0) @ BODY_FROM_OPTICAL).T
+    to_optical = (rotation_from_rpy(roll, pitch, 0.0) @ BODY_FROM_OPTICAL @ camera.head_turn).T
     directions = level @ to_optical.T
     basis = tangent_basis(directions)
     # A lean moves a direction by its cross product with the axis of the lean: roll about x, pitch about y.
@@ -58,7 +58,7 @@ def vanishing_sequence(road: RoadEstimate, camera: Camera, lines: int) -> Vanish
     )
 
 
-def attitude_on(road: RoadEstimate) -> Attitude:
+def attitude_on(road: RoadEstimate, camera: Camera) -> Attitude:
     """Lean of the camera's body as the road's borders tell it, which run side by side on the ground."""
     lean = road.covariance[ROLL : PITCH + 1, ROLL : PITCH + 1]
-    return Attitude.from_angles(float(road.state[ROLL]), float(road.state[PITCH]), lean)
+    return Attitude.from_angles(float(road.state[ROLL]), float(road.state[PITCH]), lean, camera)

@@ -60,6 +60,7 @@ class VanishingPointTracker:
     _started: bool = field(default=False, init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
     _next_number: int = field(default=1, init=False, repr=False, compare=False)
+    _looked: Array | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("gate", "widest_jump", "agility", "rate_memory", "longest_step"):
@@ -79,14 +80,14 @@ class VanishingPointTracker:
         """Forget all tracks, as after a clock that jumped; numbers are not used again."""
         self._tracks.clear()
         self._started = False
-        self._stamp = None
+        self._stamp = self._looked = None
 
     def predict(self, stamp_s: float, camera: Camera, turn_rate: float | None = None) -> Array | None:
         """Move all tracks to the time of the next picture.
 
         Args:
             stamp_s: time of the picture, s. Going back in time is a reset; far ahead, tracks are given up.
-            camera: tells by its mounting about which axis the robot turns.
+            camera: tells by its mounting about which axis the robot turns, and where a head that carries it looks.
             turn_rate: of the robot since the last picture, rad/s counter-clockwise; None when unknown.
 
         Returns:
@@ -114,6 +115,9 @@ class VanishingPointTracker:
             turn = rotation_about(-turn_rate * seconds * camera.optical_to_base[2])
             body_rates[2] = np.hypot(self.turn_rate_error[0], self.turn_rate_error[1] * turn_rate)
         optical_from_base = camera.optical_to_base.T
+        if self._looked is not None and not np.array_equal(self._looked, camera.optical_to_base):
+            turn = turn @ (optical_from_base @ self._looked)  # the head has moved
+        self._looked = camera.optical_to_base
         motion = Motion(self.rate_memory, (optical_from_base * body_rates**2) @ optical_from_base.T)
         for track in self._tracks:
             track.predict(seconds, turn, motion)
