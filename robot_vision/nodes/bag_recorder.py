@@ -5,16 +5,22 @@ The bag grows under its final name. An interrupted recording (SIGINT, SIGTERM) i
 read up to its last whole chunk, which is closed at least every two seconds. A recording never overwrites
 another unless `overwrite` says so. The messages are written by a thread of their own; what a slow disk
 cannot take is dropped, counted and said.
+
+With `wait_for_nodes` it says that it is ready once all that these nodes say is connected, so that whoever waits for
+that has the drive whole. That a publisher is known here does not mean that it knows of this subscriber. But a node
+learns of subscriptions in the order in which they were made: once it is heard on the last one, it knows them all.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
@@ -25,6 +31,7 @@ from robot_vision.nodes.bag_player import message_type
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.node import VisionNode
 from robot_vision.ros.parameters import Setting
+from robot_vision.ros.readiness import AwaitedNodes
 from robot_vision.ros.run import run_node
 
 LOOK_S = 0.1  # the graph tells nobody when a topic appears
@@ -55,6 +62,9 @@ class BagRecorder(VisionNode):
         Setting("exclude", [""], "topics not to record", live=False),
         Setting("compression", "none", "of the chunks of the bag", choices=COMPRESSIONS, live=False),
         Setting("overwrite", False, "replace a bag of this name", live=False),
+        Setting(
+            "wait_for_nodes", [""], "nodes of which nothing may be missed once this one is ready", live=False
+        ),
         Setting("nice", 10, "how much the recorder gives way to others", 0, 19, live=False),
     )
 
@@ -73,6 +83,8 @@ class BagRecorder(VisionNode):
         self._heard: dict[str, _Heard] = {}
         self._left_out: set[str] = set()
         self._said_dropped = 0
+        self._awaited_nodes = AwaitedNodes(self, settings["wait_for_nodes"])
+        self._heard_last: AwaitedNodes | None = None
         self._look_timer = self.create_timer(LOOK_S, self._look, clock=self.steady_clock)
         self.use_settings()
         self.diagnostics.report(Level.OK, f"records into {output}")
@@ -112,7 +124,35 @@ class BagRecorder(VisionNode):
 
     def _waits_for(self) -> str:
         missing = sorted(self._only - self._heard.keys() - self._left_out)
-        return super()._waits_for() or (f"nobody publishes {missing[0]}" if missing else "")
+        if self._was_ready:
+            return super()._waits_for()
+        lacking = (
+            super()._waits_for()
+            or (f"nobody publishes {missing[0]}" if missing else "")
+            or next(iter(self._awaited_nodes.missing()), "")
+            or next(self._unconnected(), "")
+        )
+        if lacking:
+            return lacking
+        if self._heard_last is None:
+            self._heard_last = AwaitedNodes(self, self._awaited_nodes.names)
+        return next(iter(self._heard_last.missing()), "")
+
+    def _unconnected(self) -> Iterator[str]:
+        """Say in words which outputs of the nodes awaited are not connected yet."""
+        for node in sorted(self._awaited_nodes.names):
+            namespace, _, name = node.rpartition("/")
+            try:
+                outputs = self.get_publisher_names_and_types_by_node(name, namespace or "/")
+            except NodeNameNonExistentError:
+                yield f"{node} is not there"
+                return
+            for topic, _ in outputs:
+                if not self._wanted(topic):
+                    continue
+                heard = self._heard.get(topic)
+                if heard is None or heard.subscription.get_publisher_count() < self.count_publishers(topic):
+                    yield f"{topic} of {node} is not connected"
 
     def _wanted(self, name: str) -> bool:
         if name in self._exclude or name in self._left_out:

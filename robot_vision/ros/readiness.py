@@ -31,6 +31,11 @@ class AwaitedNodes:
         """Whether anybody is awaited at all."""
         return bool(self._names)
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The nodes awaited, with their namespaces."""
+        return self._names
+
     def missing(self) -> list[str]:
         """Say in words who is not ready yet."""
         return [

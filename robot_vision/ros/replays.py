@@ -11,6 +11,7 @@ from typing import Any
 from robot_vision.bags import BagError
 from robot_vision.ros.processes import Graph, NodeProcess, ProcessError
 
+RECORDER = "bag_recorder"
 START_S = 180.0  # until everybody is ready: the first time kernels are compiled
 ANSWER_S = 5.0  # how long an answer to one picture is waited for
 LOOK_S = 0.2  # how often it is looked whether all processes live
@@ -49,14 +50,19 @@ def replay(
         "bag": bag,
         "lockstep": lockstep,
         "lockstep_timeout": answer_s,
-        "wait_for_nodes": list(nodes),
+        "wait_for_nodes": [*nodes, RECORDER],
         "wait_timeout": START_S,
         "duration": float(duration_s),
         "exit_at_end": False,
     }
-    recorder_settings = {"output": answers, "overwrite": True, "exclude": list(exclude)}
+    recorder_settings = {
+        "output": answers,
+        "overwrite": True,
+        "exclude": list(exclude),
+        "wait_for_nodes": list(nodes),
+    }
     with Graph() as graph:
-        recorder = graph.start("bag_recorder", recorder_settings)
+        recorder = graph.start(RECORDER, recorder_settings)
         recorder.wait_for_line("recording")
         started = [graph.start(node, {"use_sim_time": True, **settings.get(node, {})}) for node in nodes]
         player = graph.start("bag_player", player_settings)

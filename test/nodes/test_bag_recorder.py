@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from bag_graph import Graph, new_graph, write_drive
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
@@ -31,6 +33,18 @@ def count_in(path: Path) -> int:
     return odometry.count if odometry else 0
 
 
+def readiness(graph: Graph) -> Callable[[str], str]:
+    """What the newest diagnostics of the recorder say under a key, empty before they say anything."""
+    heard = graph.hear("/diagnostics", DiagnosticArray)
+
+    def said(key: str) -> str:
+        states = [s for cdr in heard for s in deserialize_message(cdr, DiagnosticArray).status]
+        mine = [s for s in states if s.name.endswith("bag_recorder")]
+        return {"message": mine[-1].message, **{v.key: v.value for v in mine[-1].values}}[key] if mine else ""
+
+    return said
+
+
 @pytest.mark.parametrize("compression", ["none", "zstd"])
 @pytest.mark.parametrize("topics", ["[image,odom]", "[]"])
 def test_play_and_record_gives_the_same_messages_back(
@@ -38,13 +52,13 @@ def test_play_and_record_gives_the_same_messages_back(
 ) -> None:
     bag, out = write_drive(tmp_path / "a.mcap", 20, (480, 640)), tmp_path / "out.mcap"
     named = {"topics": topics} if topics != "[]" else {}
-    recorder = graph.start("bag_recorder", output=out, compression=compression, **named)
+    ready = readiness(graph)
+    recorder = graph.start(
+        "bag_recorder", output=out, compression=compression, wait_for_nodes="[bag_player]", **named
+    )
     images = graph.hear("image", Image)
-    graph.until(out.exists, "the recorder")
     player = graph.start("bag_player", bag=bag, paused=True)
-    # both the test and the recorder must be there: the player waits for one subscriber only
-    for topic, listeners in (("image", 2), ("odom", 1)):
-        graph.until(lambda t=topic, n=listeners: graph.node.count_subscribers(t) == n, topic)  # type: ignore[misc]
+    graph.until(lambda: ready("ready") == "true", "the recorder")
     graph.call("bag_player/resume", Trigger)
     graph.ended(player)
     graph.until(lambda: len(images) == 20, "all pictures")
@@ -118,6 +132,26 @@ def test_topics_can_be_left_out(graph: Graph, tmp_path: Path) -> None:
     graph.until(lambda: count_in(out) == 1, "the odometry")
     graph.interrupt(recorder)
     assert "/odom" in BagReader(out).topics and "/image" not in BagReader(out).topics
+
+
+def test_it_is_ready_once_all_that_a_node_says_is_connected(graph: Graph, tmp_path: Path) -> None:
+    """The node of the test stands for one of the graph: it comes late, and says something new later still."""
+    name = graph.node.get_name()
+    said = readiness(graph)
+    recorder = graph.start("bag_recorder", output=tmp_path / "out.mcap", wait_for_nodes=f"[{name}]")
+    graph.until(lambda: f"{name} has not said" in said("message"), "it says for whom it waits")
+    assert said("ready") == "false"
+    odometry = graph.node.create_publisher(Odometry, "odom", 10)
+    diagnostics = graph.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    ready = DiagnosticStatus(name=name, values=[KeyValue(key="ready", value="true")])
+
+    def told_and_ready() -> bool:
+        diagnostics.publish(DiagnosticArray(status=[ready]))
+        return said("ready") == "true"
+
+    graph.until(told_and_ready, "it is ready")
+    assert odometry.get_subscription_count() == 1
+    graph.interrupt(recorder)
 
 
 def test_a_recording_is_not_overwritten_unless_asked(graph: Graph, tmp_path: Path) -> None:
