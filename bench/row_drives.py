@@ -163,6 +163,7 @@ def _steps(motion: Drive) -> Iterator[int]:
 
 
 def moved(since: list[Reading]) -> Motion:
+    """The motion that readings since the last picture tell."""
     if not since:
         return Motion(0.0)
     speed, turn_rate = np.mean([(said.speed, said.turn_rate) for said in since], axis=0).tolist()

@@ -34,6 +34,8 @@ ENTERS_M, ASIDE_M = 2.4, 0.48
 """Plants come into view this far ahead of base_link, and count up to this far to its sides, m."""
 SAME_M = 0.04
 """A plant of the map is a true one when it is this near, or nearer than the radius of the true one."""
+FEWEST_PICTURES = 8
+"""In which a plant must be in view to count as one that came and went."""
 STEP = STEPS_PER_SECOND // 200
 """Of the motion, between two looks at where the jets are."""
 
@@ -126,6 +128,7 @@ class _Follower:
         self._out, self._tally = out, tally
         self._ids: dict[int, list[int]] = defaultdict(list)
         self._entered: set[int] = set()
+        self._shown: dict[int, int] = defaultdict(int)
         self._left: set[int] = set()
         self._first = (out.seen[0].state.x, out.seen[0].state.y)
 
@@ -144,6 +147,8 @@ class _Follower:
         self._entered |= set(np.flatnonzero(beside & (here[:, 0] > ENTERS_M)).tolist())
         self._left |= {n for n in np.flatnonzero(here[:, 0] < 0.6).tolist() if n in self._entered}
         true = np.array([n for n in np.flatnonzero(in_view).tolist() if n in self._entered], np.intp)
+        for number in true.tolist():
+            self._shown[number] += 1
         if not len(true) or not len(plants):
             return
         away = np.linalg.norm(here[true, None] - plants.places[None], axis=2)
@@ -162,7 +167,7 @@ class _Follower:
     def judge(self) -> None:
         """Count the plants that came and went."""
         counts = self._tally.counts
-        for number in sorted(self._left):
+        for number in sorted(n for n in self._left if self._shown[n] >= FEWEST_PICTURES):
             ids = self._ids.get(number, [])
             counts["passed"] += 1
             counts["found"] += bool(ids)

@@ -19,7 +19,7 @@ Cue = Literal["row", "grid", "area"]
 CUES: tuple[Cue, ...] = ("row", "grid", "area")
 
 #: Distances between plants in a row that are tried: the least and the greatest, m, and their ratio.
-_STEPS = np.geomspace(0.06, 0.9, 271)
+_STEPS = np.geomspace(0.06, 0.9, 201)
 #: Share of the greatest coherence that the step of the grid must have, and coherence below which there is no grid.
 _AS_GOOD, _COHERENT = 0.8, 0.12
 #: Share of what was learned that is kept from picture to picture.
@@ -28,10 +28,14 @@ _FADES = 0.95
 _JITTER, _JITTER_M = 0.06, 0.012
 #: Share of the crop that is much smaller than the rest, by how much (logarithm), and its scatter.
 _STUNTED, _STUNTED_BY, _STUNTED_SIGMA = 0.12, 1.4, 0.7
+#: The step is sought in one of so many pictures, in so many rows to either side of the robot's own.
+_SELDOM, _SIDE_ROWS = 4, 2
 #: Least plants of a row that show its grid.
 _FEWEST = 3.0
-#: A cue says at most so much (logarithm of a ratio).
-_MOST = 6.0
+#: Row, grid and size say at most so much (logarithm of a ratio): a plant that was cut wrongly is out of every grid.
+_MOST, _MOST_GRID, _MOST_AREA = 6.0, 2.5, 4.0
+#: Standard deviation of the logarithm of the area of a kind: least and most.
+_ALIKE = 0.3, 0.8
 _TAU = 2.0 * np.pi
 
 
@@ -77,6 +81,8 @@ class PlantJudge:
         default_factory=lambda: np.zeros((2, len(_STEPS))), init=False, repr=False, compare=False
     )
 
+    _pictures: int = field(default=0, init=False, repr=False, compare=False)
+
     def __post_init__(self) -> None:
         if not (np.isfinite(self.step) and self.step >= 0.0):
             raise ValueError(f"step must not be negative, nor {self.step}")
@@ -91,6 +97,7 @@ class PlantJudge:
         self.scatter, self.found_step = 0.022, None
         self._learned[:] = 0.0
         self._spectrum[:] = 0.0
+        self._pictures = 0
 
     def judge(self, plants: InRow, spacing: float) -> Array:
         """Probability (N,) that each plant is a weed.
@@ -139,7 +146,7 @@ class PlantJudge:
         variance = jitter**2 * (1.0 + 1.0 / np.maximum(others, 1.0))
         inside = np.exp(-0.5 * away**2 / variance) / np.sqrt(_TAU * variance)
         coherent = (others >= _FEWEST) & (np.abs(mean) > 0.5 * others)
-        return np.where(coherent, _ratio(1.0 / step, inside), 0.0)
+        return np.where(coherent, _ratio(1.0 / step, inside, _MOST_GRID), 0.0)
 
     def _by_area(self, log_areas: Array) -> Array:
         crop, weed = self._learned
@@ -148,7 +155,8 @@ class PlantJudge:
         (large, wide), (small, narrow) = (_bell_of(kind) for kind in (crop, weed))
         usual = _bell(log_areas, large, wide)
         stunted = _bell(log_areas, large - _STUNTED_BY, _STUNTED_SIGMA)
-        return _ratio(_bell(log_areas, small, narrow), (1.0 - _STUNTED) * usual + _STUNTED * stunted)
+        crop_like = (1.0 - _STUNTED) * usual + _STUNTED * stunted
+        return _ratio(_bell(log_areas, small, narrow), crop_like, _MOST_AREA)
 
     def _learn(self, plants: InRow, ratio: Array, spacing: float) -> None:
         """Amount, sum of the logarithms of areas, of their squares, and of squared distances to the row."""
@@ -174,10 +182,11 @@ class PlantJudge:
 
         At a half or a third of the step they are in phase as well.
         """
-        if self.step:
+        self._pictures += 1
+        if self.step or self._pictures % _SELDOM != 1:
             return
         fresh = np.zeros((2, len(_STEPS)))
-        for row in np.unique(plants.row):
+        for row in range(-_SIDE_ROWS, _SIDE_ROWS + 1):
             mine = (plants.row == row) & (crop > 0.5)
             if mine.sum() < _FEWEST + 1:
                 continue
@@ -195,8 +204,8 @@ class PlantJudge:
         self.found_step = float(_STEPS[good[-1]]) if len(good) else None
 
 
-def _ratio(weed: Array | float, crop: Array) -> Array:
-    return np.asarray(np.clip(np.log(np.maximum(weed, 1e-12) / np.maximum(crop, 1e-12)), -_MOST, _MOST))
+def _ratio(weed: Array | float, crop: Array, most: float = _MOST) -> Array:
+    return np.asarray(np.clip(np.log(np.maximum(weed, 1e-12) / np.maximum(crop, 1e-12)), -most, most))
 
 
 def _bell(value: Array, mean: float, sigma: float) -> Array:
@@ -207,4 +216,4 @@ def _bell_of(kind: Array) -> tuple[float, float]:
     """Mean and standard deviation of the logarithm of the area of a kind."""
     amount = max(float(kind[3]), 1e-6)
     mean = float(kind[1]) / amount
-    return mean, float(np.sqrt(max(float(kind[2]) / amount - mean**2, 0.09)))
+    return mean, float(np.clip(np.sqrt(max(float(kind[2]) / amount - mean**2, 0.0)), *_ALIKE))

@@ -33,6 +33,8 @@ Mask = NDArray[np.bool_]
 
 #: Standard deviation by which two pictures of one plant differ in the logarithm of its area.
 _AREA_SIGMA = 0.6
+#: How far from all that is seen a plant may be expected and yet be among it, m.
+_BEYOND = 0.3
 #: Cost of what must not be matched.
 _NEVER = 1e6
 #: A plant is known once so many pictures have shown it.
@@ -272,18 +274,20 @@ class PlantMap:
         tracks = self.tracks
         if not len(tracks) or not len(blobs):
             return np.zeros(0, np.intp), np.zeros(0, np.intp)
-        away = seen[None, :, :] - expected[:, None, :]
-        total = spread[:, None] + noise[None, :]
+        # what lies behind or aside of all that is seen is none of it
+        low, high = seen.min(axis=0) - _BEYOND, seen.max(axis=0) + _BEYOND
+        near = np.flatnonzero(((expected > low) & (expected < high)).all(axis=1))
+        away = seen[None, :, :] - expected[near, None, :]
+        total = spread[near, None] + noise[None, :]
         a, b, d = total[..., 0, 0], total[..., 0, 1], total[..., 1, 1]
         x, y = away[..., 0], away[..., 1]
         cost = (d * x * x - 2.0 * b * x * y + a * y * y) / (a * d - b * b)
-        q = np.exp(tracks.states[:, 2])
-        size = np.log(blobs.areas)[None, :] - (tracks.log_areas - 2.0 * np.log(q))[:, None]
+        size = np.log(blobs.areas)[None, :] - (tracks.log_areas - 2.0 * tracks.states[:, 2])[near, None]
         cost = cost + np.where(blobs.whole[None, :], (size / _AREA_SIGMA) ** 2, 2.0)
         cost[cost > gate] = _NEVER
         mine, theirs = linear_sum_assignment(cost)
         good = cost[mine, theirs] < _NEVER
-        return mine[good], theirs[good]
+        return near[mine[good]], theirs[good]
 
     def _noise(self, blobs: Blobs, height: float) -> Array:
         """Covariance (N, 2, 2) of the middles of blobs on the ground, m^2: along the sight it is the larger."""

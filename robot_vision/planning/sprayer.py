@@ -113,7 +113,9 @@ class SprayPlanner:
         if blind or speed is None:
             self._count(plants, np.zeros(len(plants), bool), np.zeros(len(plants), bool))
             return Spray(Plants.none(), np.zeros(0, np.intp), np.zeros(0), blind)
-        weeds = np.flatnonzero(plants.kinds == PlantKind.WEED)
+        reached = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii
+        reached &= plants.places[:, 0] > self.boom_x - plants.radii - self.margin - self.latency * speed
+        weeds = np.flatnonzero((plants.kinds == PlantKind.WEED) & reached)
         half = plants.radii[weeds] + self.margin
         ahead = plants.places[weeds, 0] - self.boom_x
         times = ahead / speed - self.latency
@@ -130,7 +132,8 @@ class SprayPlanner:
 
     def _over_crop(self, plants: Plants, weeds: NDArray[np.intp], half: Array) -> NDArray[np.bool_]:
         """Whether spraying each weed (M,) would reach the crop, or what may be crop, for each lane: (M, lanes)."""
-        crop = np.flatnonzero(plants.kinds != PlantKind.WEED)
+        wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii + self.safety
+        crop = np.flatnonzero((plants.kinds != PlantKind.WEED) & wide)
         if not len(crop) or not len(weeds):
             return np.zeros((len(weeds), self.lanes), np.bool_)
         away = np.abs(plants.places[weeds, None, 0] - plants.places[None, crop, 0]) - half[:, None]

@@ -176,10 +176,11 @@ class PlantSegmenter:
         cut |= np.bincount(label, edge, count) > 0.0
         kept = amount * self.side**2 >= self.least_area
         amount = np.maximum(amount, 1.0)
-        middle = np.column_stack([np.bincount(label, part, count) / amount for part in (row, column)])[kept]
+        middle = np.column_stack([np.bincount(label, part, count) / amount for part in (row, column)])
         places = window.corner + self.side * middle
         slopes = (places - np.array([camera.x_m, 0.0])) / window.fall
-        return Blobs(slopes, amount[kept] * self.side**2, ~cut[kept], lean)
+        areas = np.minimum(amount, _disc(row, column, label, middle, slopes, amount)) * self.side**2
+        return Blobs(slopes[kept], areas[kept], ~cut[kept], lean)
 
     def _separated(
         self,
@@ -207,19 +208,30 @@ class PlantSegmenter:
         tops = tops[large[labels[tops[:, 0], tops[:, 1]]]]
         if not len(tops):
             return count, label
+        from robot_vision.perception.crop_rows.plant_kernels import share_among_seeds
+
         of = labels[tops[:, 0], tops[:, 1]]
-        label = label.copy()
-        for blob in np.unique(of):
-            mine = np.flatnonzero(of == blob)
-            if len(mine) < 2:
-                continue
-            cells = np.flatnonzero(label == blob)
-            here = np.column_stack([row[cells], column[cells]]).astype(np.float32)
-            away = ((here[:, None, :] - tops[mine].astype(np.float32)) ** 2).sum(axis=2)
-            nearest = away.argmin(axis=1)
-            label[cells[nearest > 0]] = count + nearest[nearest > 0] - 1
-            count += len(mine) - 1
+        order = np.argsort(of, kind="stable")
+        first = np.searchsorted(of[order], np.arange(count + 1))
+        names = np.arange(count, count + len(tops))
+        share_among_seeds(label, row, column, first, tops[order], names)
+        count += len(tops)
         return count, label
+
+
+def _disc(
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    label: NDArray[np.intp],
+    middle: Array,
+    slopes: Array,
+    amount: Array,
+) -> Array:
+    """Cells (N,) of discs as wide as blobs are across the sight: along it tall plants seem longer than they are."""
+    ahead = slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-9)[:, None]
+    across = (column - middle[label, 1]) * ahead[label, 0] - (row - middle[label, 0]) * ahead[label, 1]
+    # of a disc the variance is a quarter of the squared radius
+    return np.asarray(4.0 * np.pi * (np.bincount(label, across**2, len(amount)) / amount + 1.0 / 12.0))
 
 
 def row_radius(window: GroundWindow, rows: Array, spacing: float) -> float | None:
