@@ -140,7 +140,9 @@ class _Follower:
         ground = np.column_stack([truth.places, np.zeros(len(truth.places))])
         u, v = camera.pixels((ground - pose[:3, 3]) @ pose[:3, :3]).T
         beside = (np.abs(here[:, 1]) < ASIDE_M) & (here[:, 0] > 0.0)
-        in_view = beside & (here[:, 0] < ENTERS_M) & (u > 0) & (u < camera.width - 1) & (v < camera.height - 1)
+        in_view = (
+            beside & (here[:, 0] < ENTERS_M) & (u > 0) & (u < camera.width - 1) & (v < camera.height - 1)
+        )
         moved_on = np.hypot(state.x - self._first[0], state.y - self._first[1]) > SETTLING_M - ENTERS_M
         if not moved_on:
             return
@@ -162,7 +164,9 @@ class _Follower:
             if here[number, 0] < 1.0:
                 error = plants.places[k] - here[number]
                 self._tally.errors.append(error)
-                self._tally.surprises.append(float(error @ np.linalg.solve(plants.covariance[k], error)) / 2.0)
+                self._tally.surprises.append(
+                    float(error @ np.linalg.solve(plants.covariance[k], error)) / 2.0
+                )
 
     def judge(self) -> None:
         """Count the plants that came and went."""
@@ -258,6 +262,8 @@ def _clear_weeds(
             kinds[close],
             now[close],
         )
-        instant = SprayPlanner(planner.lanes, planner.width, planner.boom_x, 0.0, planner.safety, planner.margin)
+        instant = SprayPlanner(
+            planner.lanes, planner.width, planner.boom_x, 0.0, planner.safety, planner.margin
+        )
         clear[n] = n in instant.plan(true, 1.0).weeds.ids
     return clear

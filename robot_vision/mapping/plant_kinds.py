@@ -14,6 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_vision.perception.crop_rows.ground_fit import lateral
+from robot_vision.perception.lane import LaneHeading
+
 Array = NDArray[np.float64]
 Cue = Literal["row", "grid", "area"]
 CUES: tuple[Cue, ...] = ("row", "grid", "area")
@@ -28,6 +31,9 @@ _FADES = 0.95
 _JITTER, _JITTER_M = 0.06, 0.012
 #: Share of the crop that is much smaller than the rest, by how much (logarithm), and its scatter.
 _STUNTED, _STUNTED_BY, _STUNTED_SIGMA = 0.12, 1.4, 0.7
+#: Rounds in which rows are laid through their plants, distance from a row at which a plant loses its say (spacings),
+#: and how much the line is known before: m, rad.
+_LINE_ROUNDS, _LINE_SCATTER, _LINE_KNOWN = 3, 0.08, np.array([0.02, 0.01])
 #: The step is sought in one of so many pictures, in so many rows to either side of the robot's own.
 _SELDOM, _SIDE_ROWS = 4, 2
 #: Least plants of a row that show its grid.
@@ -202,6 +208,34 @@ class PlantJudge:
         peaks[[0, -1]] = False
         good = np.flatnonzero(peaks & (score > max(_AS_GOOD * score[peaks].max(initial=0.0), _COHERENT)))
         self.found_step = float(_STEPS[good[-1]]) if len(good) else None
+
+
+def in_rows(
+    places: Array, covariance: Array, log_areas: Array, lane: LaneHeading, spacing: float, scatter: float
+) -> InRow:
+    """Where plants stand in the rows, whose lines the plants near them shift a little.
+
+    Args:
+        places: (N, 2) in base_link, m.
+        covariance: (N, 2, 2) of them.
+        log_areas: (N,) of m^2.
+        lane: the robot in its row.
+        spacing: between rows, m.
+        scatter: of the crop about its row, m.
+    """
+    values = np.array([lane.offset, lane.yaw, lane.curvature, 0.0, 0.0, 0.0])
+    aside, along = lateral(places[:, 0], places[:, 1], values)
+    row = np.rint(aside / spacing).astype(np.intp)
+    aside = aside - spacing * row
+    design = np.column_stack([np.ones(len(along)), along])
+    line = np.zeros(2)
+    for _ in range(_LINE_ROUNDS):
+        left = aside - design @ line
+        say = np.exp(-0.5 * (left / (_LINE_SCATTER * spacing)) ** 2) / (scatter**2 + covariance[:, 1, 1])
+        weighted = design * say[:, None]
+        line = np.linalg.solve(weighted.T @ design + np.diag(_LINE_KNOWN**-2.0), weighted.T @ aside)
+    aside = np.asarray(aside - design @ line)
+    return InRow(row, aside, along, covariance[:, 1, 1], log_areas)
 
 
 def _ratio(weed: Array | float, crop: Array, most: float = _MOST) -> Array:

@@ -12,16 +12,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from robot_vision.geometry import Camera
-from robot_vision.mapping.plant_kinds import InRow, PlantJudge
+from robot_vision.mapping.plant_kinds import PlantJudge, in_rows
+from robot_vision.mapping.plant_matching import blob_noise, matched, shift_noise
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, common_shift
 from robot_vision.mapping.plant_tracks import PlantTracks
 from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
-from robot_vision.perception.crop_rows.ground_fit import lateral
-from robot_vision.perception.crop_rows.plant_blobs import Blobs, GroundWindow, Lean, PlantSegmenter, row_radius
+from robot_vision.perception.crop_rows.plant_blobs import (
+    Blobs,
+    GroundWindow,
+    Lean,
+    PlantSegmenter,
+    row_radius,
+)
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.tracker import RowEstimate
 from robot_vision.perception.lane import LaneHeading
@@ -31,12 +36,6 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-#: Standard deviation by which two pictures of one plant differ in the logarithm of its area.
-_AREA_SIGMA = 0.6
-#: How far from all that is seen a plant may be expected and yet be among it, m.
-_BEYOND = 0.3
-#: Cost of what must not be matched.
-_NEVER = 1e6
 #: A plant is known once so many pictures have shown it.
 KNOWN_AGE = 3
 #: Plants that so many pictures in a row have not shown are forgotten, young ones after fewer.
@@ -47,9 +46,6 @@ _BARE = 0.15
 _UNSEEN_LEAN = 0.02
 #: Share of a picture's word on how large plants are.
 _SLOWLY = 0.1
-#: Rounds in which rows are laid through their plants, distance from a row at which a plant loses its say (spacings),
-#: and how much the line is known before: m, rad.
-_LINE_ROUNDS, _LINE_SCATTER, _LINE_KNOWN = 3, 0.08, np.array([0.02, 0.01])
 #: New plants keep so many radii from known ones.
 _OWN_GROUND = 0.5
 
@@ -88,6 +84,7 @@ class PlantMap:
     shift: Shift | None = field(default=None, init=False, repr=False, compare=False)
     _next: int = field(default=1, init=False, repr=False, compare=False)
     _lean: Lean = field(default=Lean(), init=False, repr=False, compare=False)
+    _blind: bool = field(default=False, init=False, repr=False, compare=False)
     _height: float = field(default=1.0, init=False, repr=False, compare=False)
     _sigmas: Array = field(default_factory=lambda: np.full(6, 1e-3), init=False, repr=False, compare=False)
 
@@ -111,7 +108,7 @@ class PlantMap:
             motion: since the picture before.
         """
         if motion.speed is None:
-            self.reset()
+            self.tracks, self.shift = PlantTracks.none(), None
             return
         turn = (motion.turn_rate or 0.0) * motion.seconds
         way = motion.speed * motion.seconds
@@ -123,11 +120,12 @@ class PlantMap:
             [unsure, unsure, np.hypot(0.001, self.slip * turn + 0.003 * way), self.lean, self.lean, 0.004]
         )
 
-
     def update(
         self, picture: Picture, camera: Camera, rows: RowEstimate, spacing: float, motion: Motion
     ) -> Plants:
         """Take in a picture, and tell which plants stand around the robot now.
+
+        Without odometry no plant is known again: those of this picture are told, with new numbers.
 
         Args:
             picture: rectified, uint8 (H, W, 3) BGR, or (H, W) in the near infrared.
@@ -143,6 +141,7 @@ class PlantMap:
             raise ValueError("plants need the height of the camera (parameter camera.height)")
         camera = camera.rectified()
         self.move(motion)
+        self._blind = motion.speed is None
         if not rows.fault:
             self._see(picture, camera, rows, spacing)
         return self._told(rows.lane, spacing)
@@ -158,22 +157,26 @@ class PlantMap:
         if rows.rows is not None:
             radius = row_radius(window, rows.rows.values, spacing)
             if radius is not None:
-                self.radius = radius if self.radius is None else self.radius + _SLOWLY * (radius - self.radius)
+                self.radius = (
+                    radius if self.radius is None else self.radius + _SLOWLY * (radius - self.radius)
+                )
         self.see(window, camera, lean)
 
     def _told(self, lane: LaneHeading | None, spacing: float) -> Plants:
         """The plants that are known, as seen from the robot."""
         tracks = self.tracks
-        known = tracks.ages >= KNOWN_AGE
+        known = tracks.ages >= (1 if self._blind else KNOWN_AGE)
         cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
         to_base = np.array([[cosine, sine], [-sine, cosine]])
         field_places = tracks.states[known, :2]
         places = (field_places - (self.pose.x, self.pose.y)) @ to_base.T
-        covariance = to_base @ tracks.covariances[known, :2, :2] @ to_base.T
+        covariance = np.asarray(to_base @ tracks.covariances[known, :2, :2] @ to_base.T)
         log_areas = tracks.log_areas[known]
         weed = np.full(len(places), np.nan)
         if lane is not None:
-            weed = self.judge.judge(self._in_rows(places, covariance, log_areas, lane, spacing), spacing)
+            weed = self.judge.judge(
+                in_rows(places, covariance, log_areas, lane, spacing, self.judge.scatter), spacing
+            )
         kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
         kinds[weed > self.sure] = PlantKind.WEED
         kinds[weed < 0.5] = PlantKind.CROP
@@ -189,24 +192,6 @@ class PlantMap:
             field_places,
         )
 
-    def _in_rows(
-        self, places: Array, covariance: Array, log_areas: Array, lane: LaneHeading, spacing: float
-    ) -> InRow:
-        """Where plants stand in the rows, whose lines the plants near them shift a little."""
-        values = np.array([lane.offset, lane.yaw, lane.curvature, 0.0, 0.0, 0.0])
-        aside, along = lateral(places[:, 0], places[:, 1], values)
-        row = np.rint(aside / spacing).astype(np.intp)
-        aside = aside - spacing * row
-        design = np.column_stack([np.ones(len(along)), along])
-        line = np.zeros(2)
-        for _ in range(_LINE_ROUNDS):
-            left = aside - design @ line
-            say = np.exp(-0.5 * (left / (_LINE_SCATTER * spacing)) ** 2) / (self.judge.scatter**2 + covariance[:, 1, 1])
-            weighted = design * say[:, None]
-            line = np.linalg.solve(weighted.T @ design + np.diag(_LINE_KNOWN**-2.0), weighted.T @ aside)
-        aside = aside - design @ line
-        return InRow(row, aside, along, covariance[:, 1, 1], log_areas)
-
     def see(self, window: GroundWindow, camera: Camera, lean: Lean) -> None:
         """Match the plants of a window with those that are known, and correct these."""
         assert camera.height_m is not None
@@ -217,11 +202,11 @@ class PlantMap:
         height = camera.height_m
         self.shift = self._shift(blobs, camera)
         seen = height * self.shift.straightened(blobs.slopes)
-        noise = self._noise(blobs, height) + self._common(blobs, self.shift, height, camera)
+        noise = blob_noise(blobs, height, self.noise) + shift_noise(blobs, self.shift, height, camera.x_m)
         tracks = self.tracks
         expected, jacobian = tracks.seen_from(self.pose, camera.x_m)
         spread = jacobian @ tracks.covariances @ jacobian.transpose(0, 2, 1)
-        mine, theirs = self._matched(expected, spread, seen, noise, blobs, self.gate)
+        mine, theirs = matched(tracks, expected, spread, seen, noise, blobs, self.gate)
         whole = blobs.whole[theirs]
         tracks.missed[mine] = tracks.hidden[mine] = 0
         mine, theirs = mine[whole], theirs[whole]
@@ -243,10 +228,10 @@ class PlantMap:
             return none
         expected, jacobian = tracks.seen_from(self.pose, camera.x_m)
         spread = jacobian @ tracks.covariances @ jacobian.transpose(0, 2, 1)
-        own = self._noise(blobs, camera.height_m)
-        common = self._common(blobs, none, camera.height_m, camera)
+        own = blob_noise(blobs, camera.height_m, self.noise)
+        common = shift_noise(blobs, none, camera.height_m, camera.x_m)
         seen = camera.height_m * blobs.slopes
-        mine, theirs = self._matched(expected, spread, seen, own + common, blobs, self.gate)
+        mine, theirs = matched(tracks, expected, spread, seen, own + common, blobs, self.gate)
         good = blobs.whole[theirs]
         mine, theirs = mine[good], theirs[good]
         if not len(mine):
@@ -263,55 +248,11 @@ class PlantMap:
         cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
         x, y, yaw = self.pose
         self.pose = Pose(
-            float(x + cosine * ahead - sine * left), float(y + sine * ahead + cosine * left), float(yaw + turn)
+            float(x + cosine * ahead - sine * left),
+            float(y + sine * ahead + cosine * left),
+            float(yaw + turn),
         )
         return found
-
-    def _matched(
-        self, expected: Array, spread: Array, seen: Array, noise: Array, blobs: Blobs, gate: float
-    ) -> tuple[Rows, Rows]:
-        """Which plant (M,) is which blob (M,): the assignment that costs least."""
-        tracks = self.tracks
-        if not len(tracks) or not len(blobs):
-            return np.zeros(0, np.intp), np.zeros(0, np.intp)
-        # what lies behind or aside of all that is seen is none of it
-        low, high = seen.min(axis=0) - _BEYOND, seen.max(axis=0) + _BEYOND
-        near = np.flatnonzero(((expected > low) & (expected < high)).all(axis=1))
-        away = seen[None, :, :] - expected[near, None, :]
-        total = spread[near, None] + noise[None, :]
-        a, b, d = total[..., 0, 0], total[..., 0, 1], total[..., 1, 1]
-        x, y = away[..., 0], away[..., 1]
-        cost = (d * x * x - 2.0 * b * x * y + a * y * y) / (a * d - b * b)
-        size = np.log(blobs.areas)[None, :] - (tracks.log_areas - 2.0 * tracks.states[:, 2])[near, None]
-        cost = cost + np.where(blobs.whole[None, :], (size / _AREA_SIGMA) ** 2, 2.0)
-        cost[cost > gate] = _NEVER
-        mine, theirs = linear_sum_assignment(cost)
-        good = cost[mine, theirs] < _NEVER
-        return near[mine[good]], theirs[good]
-
-    def _noise(self, blobs: Blobs, height: float) -> Array:
-        """Covariance (N, 2, 2) of the middles of blobs on the ground, m^2: along the sight it is the larger."""
-        reach = height * np.linalg.norm(blobs.slopes, axis=1)
-        ahead = blobs.slopes / np.maximum(np.linalg.norm(blobs.slopes, axis=1), 1e-9)[:, None]
-        near, by_distance = self.noise
-        radius = np.sqrt(blobs.areas / np.pi)
-        across = near + by_distance * np.hypot(reach, height) / 2 + 0.06 * radius
-        along = across * np.hypot(reach, height) / height
-        out = ahead[:, :, None] * ahead[:, None, :]
-        return np.asarray(
-            across[:, None, None] ** 2 * np.eye(2) + (along**2 - across**2)[:, None, None] * out
-        )
-
-    @staticmethod
-    def _common(blobs: Blobs, shift: Shift, height: float, camera: Camera) -> Array:
-        """Covariance (N, 2, 2) that what is not known of the shift gives to what is seen, m^2."""
-        a, b = blobs.slopes.T
-        jacobian = np.zeros((len(blobs), 2, 6))
-        jacobian[:, :, FORWARD : LEFT + 1] = np.eye(2)
-        jacobian[:, 0, TURN], jacobian[:, 1, TURN] = -height * b, height * a + camera.x_m
-        jacobian[:, 0, ROLL], jacobian[:, 1, ROLL] = height * a * b, height * (1.0 + b * b)
-        jacobian[:, 0, PITCH], jacobian[:, 1, PITCH] = -height * (1.0 + a * a), -height * a * b
-        return np.asarray(jacobian @ shift.covariance @ jacobian.transpose(0, 2, 1))
 
     def _look_for(self, alone: Mask, expected: Array, window: GroundWindow, camera: Camera) -> None:
         """Note of plants without a blob whether their ground is bare, or hidden by other leaves."""
@@ -359,6 +300,4 @@ class PlantMap:
         cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
         longest = np.where(tracks.ages < KNOWN_AGE, _MOST_MISSED_YOUNG, _MOST_HIDDEN)
         ahead = (tracks.states[:, :2] - (self.pose.x, self.pose.y)) @ (cosine, sine)
-        tracks.keep(
-            (tracks.missed < most) & (tracks.hidden < longest) & (ahead > -self.behind)
-        )
+        tracks.keep((tracks.missed < most) & (tracks.hidden < longest) & (ahead > -self.behind))

@@ -70,7 +70,7 @@ def common_shift(
         weighted = jacobian * say[:, None, None]
         information = np.einsum("nij,nik->jk", weighted, jacobian) + np.diag(known)
         values = -np.linalg.solve(information, np.einsum("nij,ni->j", weighted, surprise))
-    return Shift(values, np.linalg.inv(information))
+    return Shift(values, np.asarray(np.linalg.inv(information)))
 
 
 def _by_lean(slopes: Array) -> Array:

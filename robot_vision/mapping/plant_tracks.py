@@ -83,9 +83,7 @@ class PlantTracks:
         jacobian[:, :, 2] = -seen
         return seen, jacobian
 
-    def correct(
-        self, rows: NDArray[np.intp], seen: Array, noise: Array, pose: Pose, camera_x: float
-    ) -> None:
+    def correct(self, rows: NDArray[np.intp], seen: Array, noise: Array, pose: Pose, camera_x: float) -> None:
         """Take in where plants were seen.
 
         Args:
@@ -114,7 +112,14 @@ class PlantTracks:
         self.log_areas[rows] += share * (np.log(areas) - self.log_areas[rows])
 
     def begin(
-        self, first_id: int, seen: Array, noise: Array, areas: Array, pose: Pose, camera_x: float, height: float
+        self,
+        first_id: int,
+        seen: Array,
+        noise: Array,
+        areas: Array,
+        pose: Pose,
+        camera_x: float,
+        height: float,
     ) -> None:
         """Begin with new plants.
 

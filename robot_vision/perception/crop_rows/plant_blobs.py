@@ -42,7 +42,7 @@ _TOO_LARGE = 2.2
 
 @dataclass(frozen=True)
 class Lean:
-    """How the camera stood over the leaves: roll and pitch of the body (rad), logarithm of its height over the usual."""
+    """How the camera stood over the leaves: roll and pitch (rad), logarithm of its height over the usual."""
 
     roll: float = 0.0
     pitch: float = 0.0
@@ -165,7 +165,8 @@ class PlantSegmenter:
         reach = max(int(0.5 * self.join / self.side + 0.5), 1)
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
         joined = cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel)
-        count, labels = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
+        count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
+        labels = np.asarray(components, np.int32)
         row, column = np.nonzero(grown)
         label = labels[row, column].astype(np.intp)
         if radius is not None:
@@ -181,6 +182,13 @@ class PlantSegmenter:
         slopes = (places - np.array([camera.x_m, 0.0])) / window.fall
         areas = np.minimum(amount, _disc(row, column, label, middle, slopes, amount)) * self.side**2
         return Blobs(slopes[kept], areas[kept], ~cut[kept], lean)
+
+    def warm_up(self) -> None:
+        """Load or compile the kernel, so that the first picture is not kept waiting."""
+        from robot_vision.perception.crop_rows.plant_kernels import share_among_seeds
+
+        one = np.zeros(1, np.intp)
+        share_among_seeds(one.copy(), one, one, np.array([0, 1], np.intp), np.zeros((1, 2), np.intp), one)
 
     def _separated(
         self,
