@@ -228,14 +228,15 @@ def in_rows(
     row = np.rint(aside / spacing).astype(np.intp)
     aside = aside - spacing * row
     design = np.column_stack([np.ones(len(along)), along])
-    line = np.zeros(2)
+    line: Array = np.zeros(2)
     for _ in range(_LINE_ROUNDS):
         left = aside - design @ line
         say = np.exp(-0.5 * (left / (_LINE_SCATTER * spacing)) ** 2) / (scatter**2 + covariance[:, 1, 1])
         weighted = design * say[:, None]
-        line = np.linalg.solve(weighted.T @ design + np.diag(_LINE_KNOWN**-2.0), weighted.T @ aside)
-    aside = np.asarray(aside - design @ line)
-    return InRow(row, aside, along, covariance[:, 1, 1], log_areas)
+        known = weighted.T @ design + np.diag(_LINE_KNOWN**-2.0)
+        line = np.asarray(np.linalg.solve(known, weighted.T @ aside), np.float64)
+    off = aside - design @ line
+    return InRow(row, off, along, covariance[:, 1, 1], log_areas)
 
 
 def _ratio(weed: Array | float, crop: Array, most: float = _MOST) -> Array:
