@@ -95,6 +95,14 @@ class PlantMap:
         if not 0.0 <= self.lean < 0.5:
             raise ValueError(f"lean must lie in [0, 0.5) rad, not {self.lean}")
 
+    @property
+    def lean_seen(self) -> Lean:
+        """How the body leaned in the last picture, as rows and plants have it."""
+        if self.shift is None:
+            return self._lean
+        roll, pitch = self.shift.values[[ROLL, PITCH]].tolist()
+        return Lean(self._lean.roll + roll, self._lean.pitch + pitch, self._lean.height)
+
     def reset(self) -> None:
         """Forget all plants; numbers are not given anew."""
         self.tracks = PlantTracks.none()

@@ -18,6 +18,7 @@ from std_msgs.msg import Header
 
 from robot_vision.control import CorridorSteering, Steering
 from robot_vision.mapping.plant_map import PlantMap
+from robot_vision.mapping.plants import Plants
 from robot_vision.perception.crop_rows.ground_fit import GroundFit
 from robot_vision.perception.crop_rows.plant_blobs import PlantSegmenter
 from robot_vision.perception.crop_rows.row_filter import Motion
@@ -25,7 +26,7 @@ from robot_vision.perception.crop_rows.sensitivity import PRESETS
 from robot_vision.perception.crop_rows.tracker import RowEstimate, RowTracker
 from robot_vision.perception.odometry import MotionHistory
 from robot_vision.perception.vegetation import INDICES, LeafMask, Picture, VegetationMask
-from robot_vision.planning.sprayer import Fate, SprayPlanner
+from robot_vision.planning.sprayer import Fate, Spray, SprayPlanner
 from robot_vision.ros import calibration, messages, plant_messages, qos
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
@@ -85,6 +86,7 @@ class CropRowSteeringNode(SteeringNode):
         self._law = CorridorSteering()
         self._plant_map, self._sprayer = PlantMap(), SprayPlanner()
         self._moved = Motion(0.0)
+        self._tended: tuple[Plants, Spray] | None = None
         self._calibration = Calibration(camera_place(self.settings))
         self._rectifier = Rectifier()
         self._motion = MotionHistory()
@@ -224,12 +226,14 @@ class CropRowSteeringNode(SteeringNode):
         camera, heard = self._calibration.camera, self._spray.get_subscription_count() > 0
         if camera is None or not (heard or self._plants.get_subscription_count()):
             self._plant_map.reset()
+            self._tended = None
             return
         plants = self._plant_map.update(picture, camera, estimate, self._tracker.spacing, self._moved)
         self._plants.publish(plant_messages.plants_to_message(header, plants))
         blind = "" if estimate.lane is not None else f"no row is known: {estimate.reason}"
         spray = self._sprayer.plan(plants, self._moved.speed, blind)
         self._spray.publish(plant_messages.spray_to_message(header, spray))
+        self._tended = plants, spray
         counts = {fate: int(self._sprayer.counts[fate]) for fate in Fate}
         self.diagnostics.details = {
             "spray": f"nothing is sprayed: {spray.reason}" if spray.reason else f"{len(spray)} jets planned",
@@ -266,10 +270,13 @@ class CropRowSteeringNode(SteeringNode):
 
     def _draw(self, message: Image | CompressedImage, estimate: RowEstimate) -> None:
         from robot_vision.perception.crop_rows.overlay import draw_rows
+        from robot_vision.planning.spray_overlay import draw_spray
 
         camera = self._calibration.camera
         if camera is not None:
             drawn = draw_rows(self._rectifier.colour(message), camera.rectified(), estimate)
+            if self._tended is not None:
+                draw_spray(drawn, camera.rectified(), self._plant_map.lean_seen, *self._tended, self._sprayer)
             self._overlay.publish(image_message(message.header, drawn))
 
 
