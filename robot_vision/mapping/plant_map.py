@@ -17,7 +17,7 @@ from robot_vision.geometry import Camera
 from robot_vision.mapping.plant_kinds import PlantJudge, in_rows
 from robot_vision.mapping.plant_matching import blob_noise, matched, shift_noise
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, common_shift
-from robot_vision.mapping.plant_tracks import PlantTracks
+from robot_vision.mapping.plant_tracks import PlantTracks, Stature
 from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
 from robot_vision.perception.crop_rows.plant_blobs import (
@@ -46,6 +46,10 @@ _BARE = 0.15
 _UNSEEN_LEAN = 0.02
 #: Share of a picture's word on how large plants are.
 _SLOWLY = 0.1
+#: Difference in the logarithm of the area that doubles the variance of a place.
+_AS_LARGE = 0.15
+#: Least and greatest height of the middle of a plant of the crop, in radii.
+_STATURES = 0.25, 1.2
 #: New plants keep so many radii from known ones.
 _OWN_GROUND = 0.5
 
@@ -84,6 +88,7 @@ class PlantMap:
     shift: Shift | None = field(default=None, init=False, repr=False, compare=False)
     _next: int = field(default=1, init=False, repr=False, compare=False)
     _lean: Lean = field(default=Lean(), init=False, repr=False, compare=False)
+    _tall: float = field(default=0.6, init=False, repr=False, compare=False)
     _blind: bool = field(default=False, init=False, repr=False, compare=False)
     _height: float = field(default=1.0, init=False, repr=False, compare=False)
     _sigmas: Array = field(default_factory=lambda: np.full(6, 1e-3), init=False, repr=False, compare=False)
@@ -155,6 +160,7 @@ class PlantMap:
         return self._told(rows.lane, spacing)
 
     def _see(self, picture: Picture, camera: Camera, rows: RowEstimate, spacing: float) -> None:
+        assert camera.height_m is not None
         lean, sigma = Lean(height=self._lean.height), _UNSEEN_LEAN
         if rows.rows is not None:
             lean, sigma = Lean(*rows.rows.values[ROLL:].tolist()), self.lean
@@ -165,6 +171,10 @@ class PlantMap:
         if rows.rows is not None:
             radius = row_radius(window, rows.rows.values, spacing)
             if radius is not None:
+                # rows stand as high above the ground as their leaves do on the average
+                high = camera.height_m * (1.0 - np.exp(lean.height))
+                tall = float(np.clip(high / radius, *_STATURES))
+                self._tall += (1.0 if self.radius is None else _SLOWLY) * (tall - self._tall)
                 self.radius = (
                     radius if self.radius is None else self.radius + _SLOWLY * (radius - self.radius)
                 )
@@ -218,7 +228,10 @@ class PlantMap:
         whole = blobs.whole[theirs]
         tracks.missed[mine] = tracks.hidden[mine] = 0
         mine, theirs = mine[whole], theirs[whole]
-        tracks.correct(mine, seen[theirs], noise[theirs], self.pose, camera.x_m)
+        # a blob larger or smaller than its plant has something of another, or lacks something
+        size = np.log(blobs.areas[theirs]) - tracks.log_areas[mine] + 2.0 * tracks.states[mine, 2]
+        doubt = 1.0 + (size / _AS_LARGE) ** 2
+        tracks.correct(mine, seen[theirs], noise[theirs] * doubt[:, None, None], self.pose, camera.x_m)
         q = np.exp(tracks.states[mine, 2])
         tracks.see_areas(mine, blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2)
         alone = np.ones(len(tracks), bool)
@@ -299,6 +312,7 @@ class PlantMap:
                 self.pose,
                 camera.x_m,
                 camera.height_m,
+                Stature(self.radius, self._tall),
             )
             self._next += count
 

@@ -17,12 +17,32 @@ from robot_vision.mapping.pose import Pose
 
 Array = NDArray[np.float64]
 
-#: Height of the middle of a plant and its standard deviation, in radii of the circle as large as its leaves.
-_TALL, _TALL_SIGMA = 0.6, 0.35
+#: Height of the middle of any plant and its standard deviation, in radii; the latter of plants of the crop, which are
+#: those larger than a share of a usual one.
+_TALL, _TALL_SIGMA, _CROP_SIGMA, _ALIKE = 0.6, 0.35, 0.15, 0.5
 #: Least standard deviation of the logarithm of q.
 _LEAST_SIGMA = 0.004
 #: How fast the area that is told forgets: as if it were the mean of so many pictures.
 _MEMORY = 8.0
+
+
+@dataclass(frozen=True)
+class Stature:
+    """How high plants stand, in radii of the circle as large as their leaves.
+
+    Attributes:
+        radius: of a usual plant of the crop, m; None: not known.
+        crop: height of the middle of such a plant.
+    """
+
+    radius: float | None = None
+    crop: float = 0.6
+
+    def of(self, radii: Array) -> tuple[Array, Array]:
+        """Height of the middle of plants (N,) and its standard deviation (N,), m."""
+        alike = radii > (np.inf if self.radius is None else _ALIKE * self.radius)
+        tall = np.where(alike, self.crop, _TALL)
+        return radii * tall, radii * np.where(alike, _CROP_SIGMA, _TALL_SIGMA)
 
 
 @dataclass
@@ -120,6 +140,7 @@ class PlantTracks:
         pose: Pose,
         camera_x: float,
         height: float,
+        stature: Stature,
     ) -> None:
         """Begin with new plants.
 
@@ -131,11 +152,13 @@ class PlantTracks:
             pose: of the robot in the field.
             camera_x: of the camera ahead of base_link, m.
             height: of the camera, m.
+            stature: of plants.
         """
         count = len(seen)
         radius = np.sqrt(areas / np.pi)
-        log_q = np.log(np.maximum(1.0 - _TALL * radius / height, 0.5))
-        sigma = np.hypot(_TALL_SIGMA * radius / height, _LEAST_SIGMA)
+        tall, unsure = stature.of(radius)
+        log_q = np.log(np.maximum(1.0 - tall / height, 0.5))
+        sigma = np.hypot(unsure / height, _LEAST_SIGMA)
         q = np.exp(log_q)
         to_field = _to_base(pose.yaw).T
         states = np.empty((count, 3))
