@@ -39,7 +39,7 @@ _SELDOM, _SIDE_ROWS = 4, 2
 #: Least plants of a row that show its grid.
 _FEWEST = 3.0
 #: Row, grid and size say at most so much (logarithm of a ratio): a plant that was cut wrongly is out of every grid.
-_MOST, _MOST_GRID, _MOST_AREA = 6.0, 2.5, 4.0
+_MOST, _MOST_GRID, _MOST_AREA = 6.0, 4.0, 4.0
 #: Standard deviation of the logarithm of the area of a kind: least and most.
 _ALIKE = 0.3, 0.8
 _TAU = 2.0 * np.pi

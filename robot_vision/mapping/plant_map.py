@@ -79,7 +79,7 @@ class PlantMap:
     noise: tuple[float, float] = (0.004, 0.004)
     gate: float = 14.0
     behind: float = 2.0
-    sure: float = 0.9
+    sure: float = 0.85
     mask: LeafMask = field(default_factory=LeafMask)
     judge: PlantJudge = field(default_factory=PlantJudge)
     radius: float | None = field(default=None, init=False, compare=False)

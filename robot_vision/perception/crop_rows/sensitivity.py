@@ -25,8 +25,8 @@ class Sensitivity:
 
 PRESETS: dict[str, Sensitivity] = {
     # many weeds, moss or algae on the soil, grown crop
-    "low": Sensitivity(floor=0.08, coherence=0.2, cover=0.01, sure=0.97),
-    "medium": Sensitivity(floor=0.05, coherence=0.12, cover=0.004, sure=0.9),
+    "low": Sensitivity(floor=0.08, coherence=0.2, cover=0.01, sure=0.95),
+    "medium": Sensitivity(floor=0.05, coherence=0.12, cover=0.004, sure=0.85),
     # just come up, pale, or a camera with dull colours
-    "high": Sensitivity(floor=0.03, coherence=0.08, cover=0.001, sure=0.8),
+    "high": Sensitivity(floor=0.03, coherence=0.08, cover=0.001, sure=0.7),
 }
