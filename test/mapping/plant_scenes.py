@@ -22,7 +22,7 @@ HEIGHT = 1.4
 TALL = 0.6
 """Height of the leaves in radii."""
 CAMERA = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=HEIGHT, pitch=float(np.deg2rad(35.0)))
-SPACING, STEP = 0.5, 0.25
+SPACING, STEP, CROP_RADIUS = 0.5, 0.25, 0.05
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 
@@ -55,7 +55,9 @@ class Scene:
         return picture
 
 
-def sown(seed: int = 0, weeds: int = 60, crop_radius: float = 0.05, weed_radius: float = 0.02) -> Scene:
+def sown(
+    seed: int = 0, weeds: int = 60, crop_radius: float = CROP_RADIUS, weed_radius: float = 0.02
+) -> Scene:
     """Five rows of crop, a fifth of it missing, and weeds between them that keep off the crop."""
     random = np.random.default_rng(seed)
     along, row = np.meshgrid(np.arange(0.1, 10.0, STEP), np.arange(-2, 3) * SPACING, indexing="ij")
@@ -81,6 +83,6 @@ def rows_seen(pose: Pose, fit: bool = True) -> RowEstimate:
     lane = LaneHeading(pose.yaw, 1e-6, pose.y, 1e-6, SPACING, 0.0)
     rows = None
     if fit:
-        values = np.array([pose.y, pose.yaw, 0.0, 0.0, 0.0, 0.0])
+        values = np.array([pose.y, pose.yaw, 0.0, 0.0, 0.0, np.log(1.0 - TALL * CROP_RADIUS / HEIGHT)])
         rows = RowsOnGround(values, 1e-6 * np.eye(6), SPACING, 0.8, 50)
     return RowEstimate(lane, "", fit, rows, None)
