@@ -26,6 +26,7 @@ BENCHMARKS = {
     "centres": "true centres of holes on rendered plates",
     "crbd": "crop rows of single real pictures, beside the textbook's recipe",
     "field": "crop rows of recorded drives through three simulated crops",
+    "spray": "plants followed, weeds sprayed and crop spared in three simulated crops",
     "field_loop": "crop rows driven along at 1.6 m/s, to the headland and through a gap",
     "attention": "what looking where it matters saves, and what it does to every score",
     "attitude": "roll and pitch of a body that leans by up to 3 degrees",

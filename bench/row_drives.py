@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from robot_vision.control import CorridorSteering
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.tracker import RowEstimate, RowTracker
+from robot_vision.simulation.body import BodyState
 from robot_vision.simulation.drive import STEPS_PER_SECOND
 from robot_vision.simulation.drive import Motion as Drive
 from robot_vision.simulation.live import LiveDrive, LiveSettings
@@ -88,23 +89,31 @@ def recorded(settings: dict[str, Any], seed: int, seconds: float) -> Told:
         seed: of field, drive and noise.
         seconds: of the drive.
     """
+    world, _, pictures = recorded_pictures(settings, seed, seconds)
+    tracker, told = RowTracker(_spacing(settings)), Told()
+    for picture, state, since in pictures:
+        told.take(world, (state.x, state.y, state.yaw), tracker.update(picture, world.camera, moved(since)))
+    return told
+
+
+def recorded_pictures(
+    settings: dict[str, Any], seed: int, seconds: float
+) -> tuple[World, Drive, Iterator[tuple[NDArray[np.uint8], BodyState, list[Reading]]]]:
+    """A field, the drive through it, and picture by picture where the robot is and what the wheels said since."""
     world = build_world("field", seed, settings)
     motion = drive_of(world, seconds, seed)
-    renderer, sensor, clouds = (
-        Renderer(world.scene, world.camera),
-        CameraSensor(seed),
-        Clouds(world.clouds, seed),
-    )
     readings = [Reading(*map(float, row)) for row in WheelOdometry(seed).read(motion, ODOMETRY_RATE)]
-    tracker, told = RowTracker(_spacing(settings)), Told()
-    for number, step in enumerate(_steps(motion)):
-        state = motion.state(step)
-        light = renderer.render(state.camera_pose(world.camera))
-        clouds.dim(light, step / STEPS_PER_SECOND)
-        since = readings[3 * number - 2 : 3 * number + 1] if number else []
-        estimate = tracker.update(sensor.capture(light), world.camera, _moved(since))
-        told.take(world, (state.x, state.y, state.yaw), estimate)
-    return told
+
+    def pictures() -> Iterator[tuple[NDArray[np.uint8], BodyState, list[Reading]]]:
+        renderer, sensor = Renderer(world.scene, world.camera), CameraSensor(seed)
+        clouds = Clouds(world.clouds, seed)
+        for number, step in enumerate(_steps(motion)):
+            state = motion.state(step)
+            light = renderer.render(state.camera_pose(world.camera))
+            clouds.dim(light, step / STEPS_PER_SECOND)
+            yield sensor.capture(light), state, readings[3 * number - 2 : 3 * number + 1] if number else []
+
+    return world, motion, pictures()
 
 
 def closed(settings: dict[str, Any], seed: int, speed: float, live: LiveSettings, past_end: bool) -> Told:
@@ -131,7 +140,7 @@ def closed(settings: dict[str, Any], seed: int, speed: float, live: LiveSettings
     )
     tracker, told, since = RowTracker(_spacing(settings)), Told(), list[Reading]()
     for _ in range(LONGEST_S * live.rate):
-        estimate = tracker.update(drive.picture(), world.camera, _moved(since))
+        estimate = tracker.update(drive.picture(), world.camera, moved(since))
         steering = law.update(estimate.lane, 1e-9 * drive.time_ns, estimate.end)
         drive.steer(steering.speed, steering.turn_rate, drive.time_ns)
         state = drive.state
@@ -153,7 +162,8 @@ def _steps(motion: Drive) -> Iterator[int]:
     yield from range(0, len(motion.x) - 1, STEPS_PER_SECOND // RATE)
 
 
-def _moved(since: list[Reading]) -> Motion:
+def moved(since: list[Reading]) -> Motion:
+    """The motion that readings since the last picture tell."""
     if not since:
         return Motion(0.0)
     speed, turn_rate = np.mean([(said.speed, said.turn_rate) for said in since], axis=0).tolist()

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 
 from robot_vision.bags import BagReader, decode, make_bag, score_heading
 from robot_vision.bags.messages import stamp_ns
+from robot_vision.ros.messages import points_from_cloud
 from robot_vision.ros.replays import replay
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -61,10 +63,16 @@ def test_with_attention_the_corridor_is_seen_as_well_and_the_same_way_twice(tmp_
     assert score_heading(first).yaw_rms_deg <= 0.1
 
 
-def test_the_field_is_followed_within_a_centimetre(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def field_answers(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = {"transport": "compressed", "camera.height": 1.4, "camera.pitch": 0.6109, "row.spacing": 0.5}
-    answers = tmp_path / "rows.mcap"
+    answers = tmp_path_factory.mktemp("field") / "rows.mcap"
     replay(FIELD, answers, ["crop_row_steering"], "steering", {"crop_row_steering": place}, exclude=PICTURES)
+    return answers
+
+
+def test_the_field_is_followed_within_a_centimetre(field_answers: Path) -> None:
+    answers = field_answers
     # the last one may be answered twice: when the replay's clock has gone, the robot is told to stand
     stamps = {stamp_ns(decode(cdr, TWIST)) for cdr in said(answers, "steering")}
     assert len(stamps) == 100
@@ -74,6 +82,41 @@ def test_the_field_is_followed_within_a_centimetre(tmp_path: Path) -> None:
     assert score.offset.rms <= 0.010
     assert 0.1 < score.yaw.normalised < 3.0
     assert 0.1 < score.offset.normalised < 3.0
+
+
+def clouds(bag: Path, topic: str) -> dict[int, np.ndarray]:
+    """Points by the stamp of their picture."""
+    decoded = (decode(cdr, "sensor_msgs/msg/PointCloud2") for cdr in said(bag, topic))
+    return {stamp_ns(cloud): points_from_cloud(cloud, ("x", "y", "id", "kind")) for cloud in decoded}
+
+
+def test_the_plants_of_the_field_keep_their_numbers_and_weeds_alone_are_sprayed(field_answers: Path) -> None:
+    told, truth = clouds(field_answers, "plants"), clouds(field_answers, "truth/plants")
+    jets = clouds(field_answers, "spray")
+    assert set(told) == set(jets) == set(truth)
+    numbers: dict[int, list[int]] = {}
+    kinds: list[tuple[int, int]] = []
+    sprayed_crop = sprayed = 0
+    for stamp in sorted(told)[10:]:
+        near = truth[stamp][(truth[stamp]["x"] < 2.0) & (np.abs(truth[stamp]["y"]) < 0.5)]
+        here, plants = (np.column_stack([cloud["x"], cloud["y"]]) for cloud in (near, told[stamp]))
+        away = np.linalg.norm(here[:, None] - plants[None], axis=2)
+        reach = np.maximum(0.04, np.sqrt(near["area"] / np.pi))
+        away[away > reach[:, None]] = 1e3
+        for n, k in zip(*linear_sum_assignment(away), strict=True):
+            if away[n, k] < 1e3:
+                numbers.setdefault(int(near["id"][n]), []).append(int(told[stamp]["id"][k]))
+                kinds.append((int(near["kind"][n]), int(told[stamp]["kind"][k])))
+                planned = told[stamp]["id"][k] in jets[stamp]["id"]
+                sprayed += int(planned)
+                sprayed_crop += int(planned and near["kind"][n] == 0)
+    long = [ids for ids in numbers.values() if len(ids) >= 5]
+    assert len(long) > 60
+    assert np.mean([len(set(ids)) == 1 for ids in long]) >= 0.95
+    assert np.mean([said_kind != 1 for true_kind, said_kind in kinds if true_kind == 0]) >= 0.98
+    assert np.mean([said_kind == 1 for true_kind, said_kind in kinds if true_kind == 1]) >= 0.9
+    assert sprayed > 100
+    assert sprayed_crop <= 0.02 * sprayed
 
 
 def test_a_real_road_is_known_to_a_third_of_a_degree(tmp_path: Path) -> None:

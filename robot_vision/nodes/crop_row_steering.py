@@ -2,7 +2,8 @@
 """Hears pictures of a field, says where the robot stands in its row, and steers along it until the rows end.
 
 Every picture is answered on `steering`, by standing still where no row is known; `heading` is said while one is,
-through gaps as well, as long as odometry carries it.
+through gaps as well, as long as odometry carries it. Plants are followed while somebody hears `plants` or `spray`,
+after the steering is said, so that it never waits for them.
 """
 
 from __future__ import annotations
@@ -12,16 +13,21 @@ from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
+from std_msgs.msg import Header
 
 from robot_vision.control import CorridorSteering, Steering
+from robot_vision.mapping.plant_map import PlantMap
+from robot_vision.mapping.plants import Plants
 from robot_vision.perception.crop_rows.ground_fit import GroundFit
+from robot_vision.perception.crop_rows.plant_blobs import PlantSegmenter
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.sensitivity import PRESETS
 from robot_vision.perception.crop_rows.tracker import RowEstimate, RowTracker
 from robot_vision.perception.odometry import MotionHistory
-from robot_vision.perception.vegetation import INDICES, VegetationMask
-from robot_vision.ros import calibration, messages, qos
+from robot_vision.perception.vegetation import INDICES, LeafMask, Picture, VegetationMask
+from robot_vision.planning.sprayer import Fate, Spray, SprayPlanner
+from robot_vision.ros import calibration, messages, plant_messages, qos
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.images import MESSAGES, TOPICS, Rectifier, image_message
@@ -39,12 +45,23 @@ LAW_SETTINGS = (
     Setting("stop_distance", 0.1, "where to stand before the end of the rows, m", 0.01, 50.0),
     Setting("yaw_trusted", 0.1, "standard deviation of the yaw beyond which to stop, rad", 0.001, 3.2),
 )
+SPRAY_SETTINGS = (
+    Setting("plants.view", 3.2, "ground on which plants are followed, m ahead of the camera", 1.0, 10.0),
+    Setting("plants.step", 0.0, "distance between plants in a row, m; 0: found from the plants", 0.0, 5.0),
+    Setting("spray.lanes", 24, "number of nozzles, side by side about the middle", 1, 255),
+    Setting("spray.lane_width", 0.04, "width that each nozzle sprays, m", 0.005, 2.0),
+    Setting("spray.boom_x", -0.3, "how far the nozzles sit ahead of base_link, m", -10.0, 10.0),
+    Setting("spray.latency", 0.1, "from the command to the jet on the ground, s", 0.0, 5.0),
+    Setting("spray.safety", 0.02, "distance kept from the leaves of the crop, m", 0.0, 1.0),
+    Setting("spray.margin", 0.01, "sprayed before and behind a weed, m", 0.0, 1.0),
+)
 OFFSET_TRUSTED_SPACINGS = 0.25  # who does not know in which row he is does not drive
+SPRAY_ADVICE = "look whether odometry comes, and whether the robot moves"
 UNSEEN_ADVICE = "look at rows/overlay: are plants found, and do the rows drawn lie on them?"
 
 
 class CropRowSteeringNode(SteeringNode):
-    """`image` or `image/compressed`, `camera_info` and `odom` to `heading`, `steering` and `rows/overlay`."""
+    """Pictures, `camera_info` and `odom` to `heading`, `steering`, `plants`, `spray` and `rows/overlay`."""
 
     SETTINGS = (
         Setting("transport", "raw", "how pictures come", choices=tuple(MESSAGES), live=False),
@@ -57,6 +74,7 @@ class CropRowSteeringNode(SteeringNode):
         Setting("lean", 0.02, "usual roll and pitch of the body about its mounting, rad", 0.001, 0.5),
         Setting("view", 8.0, "ground that counts, m ahead of the camera", 1.0, 50.0),
         *LAW_SETTINGS,
+        *SPRAY_SETTINGS,
         *STEERING_SETTINGS,
     )
     STEERS_BY = "picture"
@@ -66,11 +84,16 @@ class CropRowSteeringNode(SteeringNode):
         super().__init__("crop_row_steering")
         self._tracker = RowTracker(self.settings["row.spacing"])
         self._law = CorridorSteering()
+        self._plant_map, self._sprayer = PlantMap(), SprayPlanner()
+        self._moved = Motion(0.0)
+        self._tended: tuple[Plants, Spray] | None = None
         self._calibration = Calibration(camera_place(self.settings))
         self._rectifier = Rectifier()
         self._motion = MotionHistory()
         self._last_s: float | None = None
         self._heading = self.say(PoseWithCovarianceStamped, "heading", qos.ANSWER)
+        self._plants = self.say(PointCloud2, "plants", qos.ANSWER)
+        self._spray = self.say(PointCloud2, "spray", qos.ANSWER)
         self._overlay = self.say(Image, "rows/overlay", qos.ANSWER)
         self._camera_info = self.hear(CameraInfo, "camera_info", self._hear_camera_info, qos.SENSOR)
         self._odom = self.hear(Odometry, "odom", self._hear_odom, qos.ODOMETRY)
@@ -93,21 +116,40 @@ class CropRowSteeringNode(SteeringNode):
         self._calibration.move(camera_place(values))
         if values["row.spacing"] != tracker.spacing:
             tracker.reset()
+            self._plant_map.reset()
         tracker.spacing, tracker.mask, tracker.fit = values["row.spacing"], mask, fit
         tracker.coherence, tracker.cover = preset.coherence, preset.cover
         tracker.extent.gap = values["row.gap"]
         tracker.row_filter.bend = values["row.bend"]
         for name, value in law.items():
             setattr(self._law, name, value)
+        self._configure_plants(values, preset.sure, preset.floor)
         super().configure(values)
+
+    def _configure_plants(self, values: dict[str, Any], sure: float, floor: float) -> None:
+        segmenter = PlantSegmenter(far=values["plants.view"])
+        given = {
+            name.removeprefix("spray."): value for name, value in values.items() if name.startswith("spray.")
+        }
+        given["width"] = given.pop("lane_width")
+        SprayPlanner(**given)  # refuses what makes no sense
+        plant_map = self._plant_map
+        plant_map.mask = LeafMask(index=values["vegetation"], floor=floor)
+        plant_map.segmenter, plant_map.sure = segmenter, sure
+        plant_map.judge.step = values["plants.step"]
+        for name, value in given.items():
+            setattr(self._sprayer, name, value)
 
     def warm_up(self) -> None:
         """Load the compiled kernels."""
         self._tracker.detector.warm_up()
+        self._plant_map.segmenter.warm_up()
 
     def on_clock_jump_back(self) -> None:
         """Forget the row and the last command."""
         self._tracker.reset()
+        self._plant_map.reset()
+        self._sprayer.reset()
         self._law.reset()
         self._motion.clear()
         self._last_s = None
@@ -140,7 +182,8 @@ class CropRowSteeringNode(SteeringNode):
         if self._enabled:
             self._watch.reset()
         try:
-            estimate = self._look(message)
+            picture = self._picture(message)
+            estimate = self._look(picture, message)
         except ValueError as cause:
             topic = "camera_info" if isinstance(cause, CalibrationMissingError) else self._topic
             self.complain(topic, str(cause), getattr(cause, "advice", ""))
@@ -151,10 +194,11 @@ class CropRowSteeringNode(SteeringNode):
             self._heading.publish(messages.heading_to_message(message.header, estimate.lane, "row"))
         self._steer(estimate, stamp_ns(message.header.stamp))
         self.answered(message.header.stamp, began)
+        self._tend(picture, message.header, estimate)
         if self._overlay.get_subscription_count():
             self._draw(message, estimate)
 
-    def _look(self, message: Image | CompressedImage) -> RowEstimate:
+    def _picture(self, message: Image | CompressedImage) -> Picture:
         camera = self._calibration.camera
         if camera is None:
             raise CalibrationMissingError(
@@ -165,14 +209,41 @@ class CropRowSteeringNode(SteeringNode):
                 "plants have no place without the height of the camera", "set the parameter camera.height"
             )
         self._rectifier.use(camera)
+        return self._rectifier.field(message)
+
+    def _look(self, picture: Picture, message: Image | CompressedImage) -> RowEstimate:
+        camera = self._calibration.camera
+        assert camera is not None
         now_s = 1e-9 * stamp_ns(message.header.stamp)
         before_s, self._last_s = self._last_s, now_s
-        picture = self._rectifier.field(message)
-        if before_s is None:
-            return self._tracker.update(picture, camera, Motion(0.0))
-        return self._tracker.update(
-            picture, camera, Motion(now_s - before_s, *self._motion.mean(before_s, now_s))
-        )
+        self._moved = Motion(0.0)
+        if before_s is not None:
+            self._moved = Motion(now_s - before_s, *self._motion.mean(before_s, now_s))
+        return self._tracker.update(picture, camera, self._moved)
+
+    def _tend(self, picture: Picture, header: Header, estimate: RowEstimate) -> None:
+        """Follow the plants and say what to spray, for those who listen."""
+        camera, heard = self._calibration.camera, self._spray.get_subscription_count() > 0
+        if camera is None or not (heard or self._plants.get_subscription_count()):
+            self._plant_map.reset()
+            self._tended = None
+            return
+        plants = self._plant_map.update(picture, camera, estimate, self._tracker.spacing, self._moved)
+        self._plants.publish(plant_messages.plants_to_message(header, plants))
+        blind = "" if estimate.lane is not None else f"no row is known: {estimate.reason}"
+        spray = self._sprayer.plan(plants, self._moved.speed, blind)
+        self._spray.publish(plant_messages.spray_to_message(header, spray))
+        self._tended = plants, spray
+        counts = {fate: int(self._sprayer.counts[fate]) for fate in Fate}
+        self.diagnostics.details = {
+            "spray": f"nothing is sprayed: {spray.reason}" if spray.reason else f"{len(spray)} jets planned",
+            "weeds sprayed": str(counts[Fate.SPRAYED]),
+            "weeds spared, too near the crop": str(counts[Fate.SPARED]),
+            "plants spared, unsure": str(counts[Fate.UNSURE]),
+            "crop passed": str(counts[Fate.CROP]),
+        }
+        if heard and spray.reason and estimate.lane is not None:
+            self.diagnostics.report(Level.WARN, f"nothing is sprayed: {spray.reason}", SPRAY_ADVICE)
 
     def _steer(self, estimate: RowEstimate, now_ns: int) -> None:
         if not self._enabled:
@@ -199,10 +270,13 @@ class CropRowSteeringNode(SteeringNode):
 
     def _draw(self, message: Image | CompressedImage, estimate: RowEstimate) -> None:
         from robot_vision.perception.crop_rows.overlay import draw_rows
+        from robot_vision.planning.spray_overlay import draw_spray
 
         camera = self._calibration.camera
         if camera is not None:
             drawn = draw_rows(self._rectifier.colour(message), camera.rectified(), estimate)
+            if self._tended is not None:
+                draw_spray(drawn, camera.rectified(), self._plant_map.lean_seen, *self._tended, self._sprayer)
             self._overlay.publish(image_message(message.header, drawn))
 
 

@@ -180,3 +180,55 @@ class VegetationMask:
             kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
             return np.asarray(cv2.dilate(mask.view(np.uint8), kernel), np.bool_)
         return np.asarray(mask)
+
+
+@dataclass(frozen=True)
+class LeafMask:
+    """Finds leaves with their true borders: where the index falls to a share of what it is on the leaf beside.
+
+    A threshold for the whole picture makes small plants among large bright ones too small, or alone too large; the
+    border of a blurred edge lies at half its height, whatever the height.
+
+    Args:
+        index: as for `VegetationWeight`.
+        blur: standard deviation of the blur before, px.
+        floor: least index of what grows; for the infrared that above the mean.
+        share: of the greatest index nearby at which a leaf ends.
+        around: side of the square that counts as nearby, px.
+
+    Raises:
+        ValueError: naming the setting that makes no sense.
+    """
+
+    index: Index = "auto"
+    blur: float = 0.6
+    floor: float = 0.05
+    share: float = 0.5
+    around: int = 11
+
+    def __post_init__(self) -> None:
+        if self.index not in INDICES:
+            raise ValueError(f"index must be one of {', '.join(INDICES)}, not {self.index!r}")
+        if not 0.0 < self.floor < 1.0:
+            raise ValueError(f"floor must lie in (0, 1), not {self.floor}")
+        if not 0.0 <= self.share < 1.0:
+            raise ValueError(f"share must lie in [0, 1), not {self.share}")
+        if not 1 <= self.around <= 99:
+            raise ValueError(f"around must lie in [1, 99] px, not {self.around}")
+
+    def of(self, picture: Picture) -> NDArray[np.bool_]:
+        """Mask (H, W) of leaves in a picture, uint8 (H, W, 3) BGR or (H, W).
+
+        Raises:
+            ValueError: the array is no such picture.
+        """
+        index = vegetation_index(picture, self.index, self.blur)
+        infrared = picture.ndim == 2 or self.index == "infrared"
+        if infrared:
+            index = index - np.float32(index.mean(dtype=np.float64))
+        levels = cv2.convertScaleAbs(np.maximum(index, 0.0), alpha=_LEVELS)
+        if not infrared:
+            levels[cv2.cvtColor(np.asarray(picture), cv2.COLOR_BGR2GRAY) < _BLACK] = 0
+        greatest = cv2.dilate(levels, np.ones((self.around, self.around), np.uint8))
+        border = np.maximum(self.share * greatest, self.floor * _LEVELS)
+        return np.asarray(levels > border)

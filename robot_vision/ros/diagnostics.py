@@ -43,6 +43,7 @@ class Diagnostics:
         last_complaint: the latest of them.
         latency_ms: from the stamp of the last picture to its answer, by the node's clock.
         processing_ms: spent on the last answer.
+        details: what else a node has to tell, by name.
     """
 
     def __init__(self, node: Node) -> None:
@@ -56,6 +57,7 @@ class Diagnostics:
         self.last_complaint = ""
         self.latency_ms = 0.0
         self.processing_ms = 0.0
+        self.details: dict[str, str] = {}
         self._ready = False
         self._waits_for = "starting"
         self._level = Level.OK
@@ -114,6 +116,7 @@ class Diagnostics:
             "bad inputs": str(self.complaints),
             "last bad input": self.last_complaint,
             "what to try": self._advice,
+            **self.details,
         }
         status = DiagnosticStatus(
             level=bytes([level]),

@@ -14,13 +14,14 @@ import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from node_bench import NodeBench
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_srvs.srv import SetBool
 
 from robot_vision.bags import BagReader, decode
 from robot_vision.bags.messages import stamp_ns, yaw_of
 from robot_vision.geometry import Camera
-from robot_vision.ros.messages import heading_from_message
+from robot_vision.mapping.plants import PlantKind
+from robot_vision.ros.messages import heading_from_message, points_from_cloud
 
 FIELD = Path(__file__).resolve().parents[2] / "bags" / "field.mcap"
 CAMERA = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=1.4, pitch=math.radians(35.0))
@@ -87,6 +88,59 @@ def see(bench: NodeBench, moment: Moment, jpeg: bytes | None = None) -> TwistSta
     bench.say("image/compressed", CompressedImage(header=header, format="jpeg", data=data.tobytes()))
     answer: TwistStamped = bench.answer("steering", header)
     return answer
+
+
+FIELDS = ("x", "y", "z", "area", "id", "kind")
+
+
+def test_it_knows_each_plant_and_says_which_to_spray(field: list[Moment]) -> None:
+    from robot_vision.ros.domains import FreeDomain
+
+    with FreeDomain() as domain:
+        settings = {"transport": "compressed", "timeout": 20.0, "ready_patience": 0.1, **PLACE}
+        bench = NodeBench(domain.id, "crop_row_steering", settings)
+        try:
+            for kind, topic in (
+                (CompressedImage, "image/compressed"),
+                (CameraInfo, "camera_info"),
+                (Odometry, "odom"),
+            ):
+                bench.speaks(kind, topic)
+            bench.hears(TwistStamped, "steering")
+            bench.hears(PointCloud2, "plants")
+            bench.hears(PointCloud2, "spray")
+            bench.connect()
+            bench.say_surely("camera_info", CameraInfo(**CAMERA.camera_info()))
+            ids = []
+            for moment in field:
+                header = see(bench, moment).header
+                plants = points_from_cloud(bench.answer("plants", header), FIELDS)
+                spray = bench.answer("spray", header)
+                jets = points_from_cloud(spray, (*FIELDS, "lane", "time_to_nozzle"))
+                ids.append(set(plants["id"].tolist()))
+                assert len(ids[-1]) == len(plants)
+                assert set(jets["id"].tolist()) <= ids[-1]
+                assert (jets["kind"] == PlantKind.WEED).all()
+            assert spray.header.frame_id == "base_link"
+            assert len(plants) > 20
+            assert len(ids[-1] & ids[-2]) > 0.8 * len(ids[-2])
+            assert len(jets) > 3
+            nozzles = -0.48 + 0.04 * (jets["lane"] + 0.5)
+            assert np.abs(jets["y"] - nozzles).max() < 0.02 + 0.5 * np.sqrt(jets["area"].max() / np.pi) + 1e-6
+            assert bench.set_parameter("spray.lanes", 0).successful is False
+            assert bench.set_parameter("sensitivity", "low").successful
+            # pictures go on, odometry does not: nobody knows where the weeds are when the boom comes
+            for moment in field[:8]:
+                header = bench.header("camera_optical_frame", PERIOD_NS)
+                data = np.frombuffer(moment.jpeg, np.uint8)
+                bench.say(
+                    "image/compressed", CompressedImage(header=header, format="jpeg", data=data.tobytes())
+                )
+                spray = bench.answer("spray", header)
+            assert len(points_from_cloud(spray, FIELDS)) == 0
+            bench.until(lambda: "odometry" in bench.state("spray"), "diagnostics say why nothing is sprayed")
+        finally:
+            bench.close()
 
 
 def heading_of(bench: NodeBench, steering: TwistStamped) -> PoseWithCovarianceStamped | None:

@@ -58,6 +58,7 @@ class RowEstimate:
         seen: whether this picture shows the rows; else `lane` is carried on by odometry.
         rows: as this picture alone has them; None where it does not.
         end: metres from the robot to where the rows end; None while no end is in sight.
+        fault: why the picture shows nothing at all, as at night; empty when it does.
     """
 
     lane: LaneHeading | None
@@ -65,6 +66,7 @@ class RowEstimate:
     seen: bool
     rows: RowsOnGround | None
     end: float | None
+    fault: str = ""
 
 
 @dataclass
@@ -135,7 +137,7 @@ class RowTracker:
         fault = fault_of(picture)
         if fault:
             # Odometry alone may carry on over ground that was looked at and is bare, not through the dark
-            return replace(self._without(fault), lane=None)
+            return replace(self._without(fault), lane=None, fault=fault)
         mask = self.mask.of(picture)
         cell = _CELL_PX * max(1, picture.shape[1] // 640)
         pieces = pieces_of(mask, camera, cell)

@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Knows every plant around the robot from the picture in which it comes into view to where the boom has passed it.
+
+After Sanchiz, Marchant, Pla and Hague (1996): plants of a picture are matched with those that are known, where the
+robot's motion lets them be expected; what all plants share of the difference is the lean of the body and the error of
+odometry; what is left corrects each plant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry import Camera
+from robot_vision.mapping.plant_kinds import PlantJudge, in_rows
+from robot_vision.mapping.plant_matching import blob_noise, matched, shift_noise
+from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, common_shift
+from robot_vision.mapping.plant_tracks import PlantTracks, Stature
+from robot_vision.mapping.plants import PlantKind, Plants
+from robot_vision.mapping.pose import Pose
+from robot_vision.perception.crop_rows.plant_blobs import (
+    Blobs,
+    GroundWindow,
+    Lean,
+    PlantSegmenter,
+    row_radius,
+)
+from robot_vision.perception.crop_rows.row_filter import Motion
+from robot_vision.perception.crop_rows.tracker import RowEstimate
+from robot_vision.perception.lane import LaneHeading
+from robot_vision.perception.vegetation import LeafMask, Picture
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+#: A plant is known once so many pictures have shown it.
+KNOWN_AGE = 3
+#: Plants that so many pictures in a row have not shown are forgotten, young ones after fewer.
+_MOST_MISSED, _MOST_MISSED_YOUNG, _MOST_HIDDEN = 5, 2, 12
+#: Share of the ground about a plant's place below which it is bare.
+_BARE = 0.15
+#: Standard deviation of roll and pitch where no rows tell them, rad.
+_UNSEEN_LEAN = 0.02
+#: Share of a picture's word on how large plants are.
+_SLOWLY = 0.1
+#: Difference in the logarithm of the area that doubles the variance of a place.
+_AS_LARGE = 0.15
+#: Least and greatest height of the middle of a plant of the crop, in radii.
+_STATURES = 0.25, 1.2
+#: New plants keep so many radii from known ones.
+_OWN_GROUND = 0.5
+
+
+@dataclass
+class PlantMap:
+    """Follows plants from picture to picture.
+
+    Args:
+        segmenter: of single pictures.
+        lean: standard deviations of roll and pitch (rad) that the rows leave open; 0: plants have no say in them.
+        slip: standard deviation of what odometry misses, a share of the way and of the turn.
+        noise: standard deviation of the middle of a plant in a picture: m, and m for a metre of distance.
+        gate: squared Mahalanobis distance (3 degrees of freedom) beyond which plants are not the same.
+        behind: plants so far behind base_link are forgotten, m.
+        sure: probability from which on a plant is called a weed.
+        mask: of leaves.
+        judge: of crop and weeds.
+
+    Raises:
+        ValueError: naming the setting that makes no sense.
+    """
+
+    segmenter: PlantSegmenter = field(default_factory=PlantSegmenter)
+    lean: float = 0.002
+    slip: float = 0.03
+    noise: tuple[float, float] = (0.004, 0.004)
+    gate: float = 14.0
+    behind: float = 2.0
+    sure: float = 0.85
+    mask: LeafMask = field(default_factory=LeafMask)
+    judge: PlantJudge = field(default_factory=PlantJudge)
+    radius: float | None = field(default=None, init=False, compare=False)
+    tracks: PlantTracks = field(default_factory=PlantTracks.none, init=False, repr=False, compare=False)
+    pose: Pose = field(default=Pose(0.0, 0.0, 0.0), init=False, compare=False)
+    shift: Shift | None = field(default=None, init=False, repr=False, compare=False)
+    _next: int = field(default=1, init=False, repr=False, compare=False)
+    _lean: Lean = field(default=Lean(), init=False, repr=False, compare=False)
+    _tall: float = field(default=0.6, init=False, repr=False, compare=False)
+    _blind: bool = field(default=False, init=False, repr=False, compare=False)
+    _height: float = field(default=1.0, init=False, repr=False, compare=False)
+    _sigmas: Array = field(default_factory=lambda: np.full(6, 1e-3), init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("slip", "gate", "behind"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ValueError(f"{name} must be a positive number, not {getattr(self, name)}")
+        if not 0.0 <= self.lean < 0.5:
+            raise ValueError(f"lean must lie in [0, 0.5) rad, not {self.lean}")
+
+    @property
+    def lean_seen(self) -> Lean:
+        """How the body leaned in the last picture, as rows and plants have it."""
+        if self.shift is None:
+            return self._lean
+        roll, pitch = self.shift.values[[ROLL, PITCH]].tolist()
+        return Lean(self._lean.roll + roll, self._lean.pitch + pitch, self._lean.height)
+
+    def reset(self) -> None:
+        """Forget all plants; numbers are not given anew."""
+        self.tracks = PlantTracks.none()
+        self.pose, self.shift, self.radius = Pose(0.0, 0.0, 0.0), None, None
+        self.judge.reset()
+
+    def move(self, motion: Motion) -> None:
+        """Go on by what the robot did; without a speed nobody knows where the plants are now.
+
+        Args:
+            motion: since the picture before.
+        """
+        if motion.speed is None:
+            self.tracks, self.shift = PlantTracks.none(), None
+            return
+        turn = (motion.turn_rate or 0.0) * motion.seconds
+        way = motion.speed * motion.seconds
+        chord, course = way * np.sinc(turn / 2 / np.pi), self.pose.yaw + turn / 2
+        x, y, yaw = self.pose
+        self.pose = Pose(x + chord * np.cos(course), y + chord * np.sin(course), yaw + turn)
+        unsure = np.hypot(0.003, self.slip * way)
+        self._sigmas = np.array(
+            [unsure, unsure, np.hypot(0.001, self.slip * turn + 0.003 * way), self.lean, self.lean, 0.004]
+        )
+
+    def update(
+        self, picture: Picture, camera: Camera, rows: RowEstimate, spacing: float, motion: Motion
+    ) -> Plants:
+        """Take in a picture, and tell which plants stand around the robot now.
+
+        Without odometry no plant is known again: those of this picture are told, with new numbers.
+
+        Args:
+            picture: rectified, uint8 (H, W, 3) BGR, or (H, W) in the near infrared.
+            camera: with its place on the robot, of the picture's size; its height must be known.
+            rows: what the tracker says of the same picture.
+            spacing: between rows, m.
+            motion: since the picture before.
+
+        Raises:
+            ValueError: the camera has no height, or the array is no picture.
+        """
+        if camera.height_m is None:
+            raise ValueError("plants need the height of the camera (parameter camera.height)")
+        camera = camera.rectified()
+        self.move(motion)
+        self._blind = motion.speed is None
+        if not rows.fault:
+            self._see(picture, camera, rows, spacing)
+        return self._told(rows.lane, spacing)
+
+    def _see(self, picture: Picture, camera: Camera, rows: RowEstimate, spacing: float) -> None:
+        assert camera.height_m is not None
+        lean, sigma = Lean(height=self._lean.height), _UNSEEN_LEAN
+        if rows.rows is not None:
+            lean, sigma = Lean(*rows.rows.values[ROLL:].tolist()), self.lean
+        self._lean = lean
+        self._sigmas[[ROLL, PITCH]] = sigma
+        mask = self.mask.of(picture)
+        window = self.segmenter.look(mask, camera, lean)
+        if rows.rows is not None:
+            radius = row_radius(window, rows.rows.values, spacing)
+            if radius is not None:
+                # rows stand as high above the ground as their leaves do on the average
+                high = camera.height_m * (1.0 - np.exp(lean.height))
+                tall = float(np.clip(high / radius, *_STATURES))
+                self._tall += (1.0 if self.radius is None else _SLOWLY) * (tall - self._tall)
+                self.radius = (
+                    radius if self.radius is None else self.radius + _SLOWLY * (radius - self.radius)
+                )
+        self.see(window, camera, lean)
+
+    def _told(self, lane: LaneHeading | None, spacing: float) -> Plants:
+        """The plants that are known, as seen from the robot."""
+        tracks = self.tracks
+        known = tracks.ages >= (1 if self._blind else KNOWN_AGE)
+        cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
+        to_base = np.array([[cosine, sine], [-sine, cosine]])
+        field_places = tracks.states[known, :2]
+        places = (field_places - (self.pose.x, self.pose.y)) @ to_base.T
+        covariance = np.asarray(to_base @ tracks.covariances[known, :2, :2] @ to_base.T)
+        log_areas = tracks.log_areas[known]
+        weed = np.full(len(places), np.nan)
+        if lane is not None:
+            weed = self.judge.judge(
+                in_rows(places, covariance, log_areas, lane, spacing, self.judge.scatter), spacing
+            )
+        kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
+        kinds[weed > self.sure] = PlantKind.WEED
+        kinds[weed < 0.5] = PlantKind.CROP
+        return Plants(
+            tracks.ids[known],
+            places,
+            self._height * (1.0 - np.exp(tracks.states[known, 2])),
+            np.exp(log_areas),
+            tracks.ages[known],
+            covariance,
+            weed,
+            kinds,
+            field_places,
+        )
+
+    def see(self, window: GroundWindow, camera: Camera, lean: Lean) -> None:
+        """Match the plants of a window with those that are known, and correct these."""
+        assert camera.height_m is not None
+        self._height = camera.height_m
+        known = self.tracks.seen_from(self.pose, camera.x_m)[0][self.tracks.ages >= KNOWN_AGE]
+        places = known * (window.fall / camera.height_m) + (camera.x_m, 0.0)
+        blobs = self.segmenter.cut(window, camera, lean, self.radius, places)
+        height = camera.height_m
+        self.shift = self._shift(blobs, camera)
+        seen = height * self.shift.straightened(blobs.slopes)
+        noise = blob_noise(blobs, height, self.noise) + shift_noise(blobs, self.shift, height, camera.x_m)
+        tracks = self.tracks
+        expected, jacobian = tracks.seen_from(self.pose, camera.x_m)
+        spread = jacobian @ tracks.covariances @ jacobian.transpose(0, 2, 1)
+        mine, theirs = matched(tracks, expected, spread, seen, noise, blobs, self.gate)
+        whole = blobs.whole[theirs]
+        tracks.missed[mine] = tracks.hidden[mine] = 0
+        mine, theirs = mine[whole], theirs[whole]
+        # a blob larger or smaller than its plant has something of another, or lacks something
+        size = np.log(blobs.areas[theirs]) - tracks.log_areas[mine] + 2.0 * tracks.states[mine, 2]
+        doubt = 1.0 + (size / _AS_LARGE) ** 2
+        tracks.correct(mine, seen[theirs], noise[theirs] * doubt[:, None, None], self.pose, camera.x_m)
+        q = np.exp(tracks.states[mine, 2])
+        tracks.see_areas(mine, blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2)
+        alone = np.ones(len(tracks), bool)
+        alone[mine] = False
+        self._look_for(alone, expected, window, camera)
+        self._begin(blobs, theirs, seen, noise, camera)
+        self._forget()
+
+    def _shift(self, blobs: Blobs, camera: Camera) -> Shift:
+        """What all plants share; by it the pose is corrected."""
+        assert camera.height_m is not None
+        none = Shift(np.zeros(6), np.diag(self._sigmas**2))
+        tracks = self.tracks
+        if not len(tracks) or not len(blobs):
+            return none
+        expected, jacobian = tracks.seen_from(self.pose, camera.x_m)
+        spread = jacobian @ tracks.covariances @ jacobian.transpose(0, 2, 1)
+        own = blob_noise(blobs, camera.height_m, self.noise)
+        common = shift_noise(blobs, none, camera.height_m, camera.x_m)
+        seen = camera.height_m * blobs.slopes
+        mine, theirs = matched(tracks, expected, spread, seen, own + common, blobs, self.gate)
+        good = blobs.whole[theirs]
+        mine, theirs = mine[good], theirs[good]
+        if not len(mine):
+            return none
+        found = common_shift(
+            blobs.slopes[theirs],
+            expected[mine],
+            spread[mine] + own[theirs],
+            camera.height_m,
+            camera.x_m,
+            self._sigmas,
+        )
+        ahead, left, turn = found.values[[FORWARD, LEFT, TURN]]
+        cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
+        x, y, yaw = self.pose
+        self.pose = Pose(
+            float(x + cosine * ahead - sine * left),
+            float(y + sine * ahead + cosine * left),
+            float(yaw + turn),
+        )
+        return found
+
+    def _look_for(self, alone: Mask, expected: Array, window: GroundWindow, camera: Camera) -> None:
+        """Note of plants without a blob whether their ground is bare, or hidden by other leaves."""
+        assert camera.height_m is not None
+        tracks = self.tracks
+        places = expected * (window.fall / camera.height_m) + (camera.x_m, 0.0)
+        index, inside = window.at(places)
+        looked = np.flatnonzero(alone & inside)
+        if not len(looked):
+            return
+        reach = np.arange(-1, 2) * max(int(0.006 / window.side), 1)
+        shape = window.cells.shape
+        rows = np.clip(index[looked, 0, None, None] + reach[None, :, None], 0, shape[0] - 1)
+        columns = np.clip(index[looked, 1, None, None] + reach[None, None, :], 0, shape[1] - 1)
+        bare = (window.cells[rows, columns] > 0).mean(axis=(1, 2)) < _BARE
+        tracks.missed[looked[bare]] += 1
+        tracks.hidden[looked[~bare]] += 1
+
+    def _begin(self, blobs: Blobs, taken: Rows, seen: Array, noise: Array, camera: Camera) -> None:
+        """Begin with blobs that are no known plant."""
+        assert camera.height_m is not None
+        new = blobs.whole.copy()
+        new[taken] = False
+        if len(self.tracks) and new.any():
+            expected, _ = self.tracks.seen_from(self.pose, camera.x_m)
+            radius = np.sqrt(np.exp(self.tracks.log_areas) / np.pi)
+            away = np.linalg.norm(seen[new][:, None, :] - expected[None, :, :], axis=2)
+            new[np.flatnonzero(new)[(away < _OWN_GROUND * radius).any(axis=1)]] = False
+        count = int(new.sum())
+        if count:
+            self.tracks.begin(
+                self._next,
+                seen[new],
+                noise[new],
+                blobs.areas[new] * np.exp(-2.0 * blobs.lean.height),
+                self.pose,
+                camera.x_m,
+                camera.height_m,
+                Stature(self.radius, self._tall),
+            )
+            self._next += count
+
+    def _forget(self) -> None:
+        tracks = self.tracks
+        most = np.where(tracks.ages < KNOWN_AGE, _MOST_MISSED_YOUNG, _MOST_MISSED)
+        cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
+        longest = np.where(tracks.ages < KNOWN_AGE, _MOST_MISSED_YOUNG, _MOST_HIDDEN)
+        ahead = (tracks.states[:, :2] - (self.pose.x, self.pose.y)) @ (cosine, sine)
+        tracks.keep((tracks.missed < most) & (tracks.hidden < longest) & (ahead > -self.behind))

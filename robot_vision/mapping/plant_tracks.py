@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Kalman filter for each plant, all of them in one set of arrays: plants do not sway each other.
+
+A plant's state is its place in the field (m) and the logarithm of the share q = 1 - h / H of the camera's height H
+that is above its middle: for a camera at c the sight to it falls by 1 while it goes (p - c) / (q H) over the ground,
+so that a tall plant, seen from afar and then from near by, tells its height and with it where its stem stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.mapping.pose import Pose
+
+Array = NDArray[np.float64]
+
+#: Height of the middle of any plant and its standard deviation, in radii; the latter of plants of the crop, which are
+#: those larger than a share of a usual one.
+_TALL, _TALL_SIGMA, _CROP_SIGMA, _ALIKE = 0.6, 0.35, 0.15, 0.5
+#: Least standard deviation of the logarithm of q.
+_LEAST_SIGMA = 0.004
+#: How fast the area that is told forgets: as if it were the mean of so many pictures.
+_MEMORY = 8.0
+
+
+@dataclass(frozen=True)
+class Stature:
+    """How high plants stand, in radii of the circle as large as their leaves.
+
+    Attributes:
+        radius: of a usual plant of the crop, m; None: not known.
+        crop: height of the middle of such a plant.
+    """
+
+    radius: float | None = None
+    crop: float = 0.6
+
+    def of(self, radii: Array) -> tuple[Array, Array]:
+        """Height of the middle of plants (N,) and its standard deviation (N,), m."""
+        alike = radii > (np.inf if self.radius is None else _ALIKE * self.radius)
+        tall = np.where(alike, self.crop, _TALL)
+        return radii * tall, radii * np.where(alike, _CROP_SIGMA, _TALL_SIGMA)
+
+
+@dataclass
+class PlantTracks:
+    """All plants that are known, one row each.
+
+    Attributes:
+        ids: (N,) uint32.
+        states: (N, 3) x and y in the field (m), logarithm of q.
+        covariances: (N, 3, 3).
+        log_areas: (N,) of m^2.
+        ages: (N,) pictures that showed it.
+        missed: (N,) pictures in a row that showed bare ground in its place.
+        hidden: (N,) pictures in a row that showed other leaves in its place.
+    """
+
+    ids: NDArray[np.uint32]
+    states: Array
+    covariances: Array
+    log_areas: Array
+    ages: NDArray[np.intp]
+    missed: NDArray[np.intp]
+    hidden: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @staticmethod
+    def none() -> PlantTracks:
+        """No plant yet."""
+        count = np.zeros(0, np.intp)
+        return PlantTracks(
+            np.zeros(0, np.uint32),
+            np.zeros((0, 3)),
+            np.zeros((0, 3, 3)),
+            np.zeros(0),
+            count,
+            count.copy(),
+            count.copy(),
+        )
+
+    def keep(self, which: NDArray[np.bool_]) -> None:
+        """Forget the others."""
+        for name in self.__dataclass_fields__:
+            setattr(self, name, getattr(self, name)[which])
+
+    def seen_from(self, pose: Pose, camera_x: float) -> tuple[Array, Array]:
+        """Where the middles of plants appear on the ground from a camera, (N, 2) ahead and left of it, m.
+
+        Also the derivatives (N, 2, 3) by the state.
+        """
+        turn = _to_base(pose.yaw)
+        away = (self.states[:, :2] - (pose.x, pose.y)) @ turn.T - (camera_x, 0.0)
+        rise = np.exp(-self.states[:, 2])
+        seen = away * rise[:, None]
+        jacobian = np.empty((len(self), 2, 3))
+        jacobian[:, :, :2] = turn * rise[:, None, None]
+        jacobian[:, :, 2] = -seen
+        return seen, jacobian
+
+    def correct(self, rows: NDArray[np.intp], seen: Array, noise: Array, pose: Pose, camera_x: float) -> None:
+        """Take in where plants were seen.
+
+        Args:
+            rows: (M,) of the plants.
+            seen: (M, 2) as of `seen_from`.
+            noise: (M, 2, 2) of it.
+            pose: of the robot in the field.
+            camera_x: of the camera ahead of base_link, m.
+        """
+        expected, jacobian = self.seen_from(pose, camera_x)
+        expected, jacobian = expected[rows], jacobian[rows]
+        before = self.covariances[rows]
+        cross = before @ jacobian.transpose(0, 2, 1)
+        gain = cross @ np.linalg.inv(jacobian @ cross + noise)
+        self.states[rows] += (gain @ (seen - expected)[:, :, None])[:, :, 0]
+        # Joseph's form, which stays positive
+        left = np.eye(3) - gain @ jacobian
+        after = left @ before @ left.transpose(0, 2, 1) + gain @ noise @ gain.transpose(0, 2, 1)
+        self.covariances[rows] = 0.5 * (after + after.transpose(0, 2, 1))
+
+    def see_areas(self, rows: NDArray[np.intp], areas: Array) -> None:
+        """Take in how large plants (M,) are, m^2, and that they were seen."""
+        self.ages[rows] += 1
+        self.missed[rows] = self.hidden[rows] = 0
+        share = np.maximum(1.0 / self.ages[rows], 1.0 / _MEMORY)
+        self.log_areas[rows] += share * (np.log(areas) - self.log_areas[rows])
+
+    def begin(
+        self,
+        first_id: int,
+        seen: Array,
+        noise: Array,
+        areas: Array,
+        pose: Pose,
+        camera_x: float,
+        height: float,
+        stature: Stature,
+    ) -> None:
+        """Begin with new plants.
+
+        Args:
+            first_id: of them; the others follow.
+            seen: (M, 2) as of `seen_from`, m.
+            noise: (M, 2, 2) of it.
+            areas: (M,) as they appear on the ground, m^2.
+            pose: of the robot in the field.
+            camera_x: of the camera ahead of base_link, m.
+            height: of the camera, m.
+            stature: of plants.
+        """
+        count = len(seen)
+        radius = np.sqrt(areas / np.pi)
+        tall, unsure = stature.of(radius)
+        log_q = np.log(np.maximum(1.0 - tall / height, 0.5))
+        sigma = np.hypot(unsure / height, _LEAST_SIGMA)
+        q = np.exp(log_q)
+        to_field = _to_base(pose.yaw).T
+        states = np.empty((count, 3))
+        states[:, :2] = (seen * q[:, None] + (camera_x, 0.0)) @ to_field.T + (pose.x, pose.y)
+        states[:, 2] = log_q
+        slant = (seen * q[:, None]) @ to_field.T
+        covariances = np.zeros((count, 3, 3))
+        covariances[:, :2, :2] = q[:, None, None] ** 2 * (to_field @ noise @ to_field.T)
+        covariances[:, :2, :2] += sigma[:, None, None] ** 2 * slant[:, :, None] * slant[:, None, :]
+        covariances[:, :2, 2] = covariances[:, 2, :2] = sigma[:, None] ** 2 * slant
+        covariances[:, 2, 2] = sigma**2
+        fresh = PlantTracks(
+            np.arange(first_id, first_id + count, dtype=np.uint32),
+            states,
+            covariances,
+            np.log(areas * q**2),
+            np.ones(count, np.intp),
+            np.zeros(count, np.intp),
+            np.zeros(count, np.intp),
+        )
+        for name in self.__dataclass_fields__:
+            setattr(self, name, np.concatenate([getattr(self, name), getattr(fresh, name)]))
+
+
+def _to_base(yaw: float) -> Array:
+    """Matrix (2, 2) that turns vectors of the field into those of a robot that heads for yaw."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    return np.array([[cosine, sine], [-sine, cosine]])

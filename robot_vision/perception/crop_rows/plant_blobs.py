@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Single plants in one picture: what grows is laid out on the ground and cut into plants there.
+
+On the ground a plant is as large wherever it stands, so that one size tells leaves of one plant from plants side by
+side. The ground is looked at from above in a window of square cells, at the height of the leaves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.geometry import Camera
+from robot_vision.geometry.rotation import rotation_from_rpy
+from robot_vision.perception.crop_rows.ground_fit import lateral
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Vegetation this near to the picture's border (px) belongs to a plant that may go on beyond it.
+_BORDER = 6
+#: Marks of a cell of the window: something grows there; likewise, at the border of the picture.
+_GROWS, _CUT = 1, 3
+#: Blur with which bodies of plants stand out, and distance between them, in radii of a usual plant.
+_BODY, _APART = 0.3, 0.9
+#: The same from plants that are known already.
+_NEW = 1.3
+#: Height of a body in the blurred picture, 1 being grown over all around.
+_LEAST_BODY = 0.3
+#: Radius of a usual plant in the cells in which bodies are sought.
+_COARSE = 6.0
+#: Ground that tells how wide rows are (m ahead of the nearest), in so many bins; fewest cells and rounds of the fit.
+_NEAR_M, _BINS, _FEWEST_CELLS, _ROUNDS = 1.2, 60, 100, 20
+#: Standard deviation of a plant about the line of its row, m.
+_SOWN = 0.014
+#: Blobs larger than so many usual plants are cut.
+_TOO_LARGE = 2.2
+
+
+@dataclass(frozen=True)
+class Lean:
+    """How the camera stood over the leaves: roll and pitch (rad), logarithm of its height over the usual."""
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    height: float = -0.02
+
+
+@dataclass(frozen=True)
+class Blobs:
+    """What stands on its own in one picture.
+
+    Attributes:
+        slopes: (N, 2) way ahead and to the left of the camera that the sight to the middle of each goes while it
+            falls by 1, the body taken to lean as told.
+        areas: (N,) on the plane of the window, m^2.
+        whole: (N,) whether all of it is in the picture.
+        lean: the one taken.
+    """
+
+    slopes: Array
+    areas: Array
+    whole: Mask
+    lean: Lean
+
+    def __len__(self) -> int:
+        return len(self.areas)
+
+
+@dataclass(frozen=True)
+class GroundWindow:
+    """The ground before the robot seen from above, in square cells.
+
+    Attributes:
+        cells: uint8 (rows, columns); row 0 the nearest, column 0 the rightmost; 0 bare or not in the picture.
+        seen: bool (rows, columns): in the picture, not at its border.
+        corner: (2,) ahead and left of base_link of the middle of cell (0, 0), m.
+        side: of a cell, m.
+        fall: height of the camera over the window's plane, m.
+    """
+
+    cells: NDArray[np.uint8]
+    seen: Mask
+    corner: Array
+    side: float
+    fall: float
+
+    def at(self, places: Array) -> tuple[NDArray[np.intp], Mask]:
+        """Cells (N, 2) of places (N, 2) in the window's plane, and whether they are in view."""
+        index = np.rint((places - self.corner) / self.side).astype(np.intp)
+        shape = np.array(self.cells.shape)
+        inside = ((index >= 0) & (index < shape)).all(axis=1)
+        index = np.clip(index, 0, shape - 1)
+        return index, inside & self.seen[index[:, 0], index[:, 1]]
+
+
+@dataclass(frozen=True)
+class PlantSegmenter:
+    """Cuts a mask of vegetation into plants.
+
+    Args:
+        far: ground looked at, m ahead of the camera.
+        aside: ground looked at to either side, m.
+        side: of the cells, m.
+        join: leaves as near to each other belong to one plant, m.
+        least_area: smaller plants are left out, m^2.
+
+    Raises:
+        ValueError: naming the setting that makes no sense.
+    """
+
+    far: float = 3.2
+    aside: float = 1.3
+    side: float = 0.006
+    join: float = 0.012
+    least_area: float = 1.5e-4
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} must be a positive number, not {value}")
+        if self.far * self.aside / self.side**2 > 4e6:
+            raise ValueError(f"cells of {self.side:g} m are too many for {self.far:g} m of ground")
+
+    def look(self, mask: Mask, camera: Camera, lean: Lean) -> GroundWindow:
+        """Lay a mask (H, W) out on the ground, for a body that leans."""
+        assert camera.height_m is not None
+        fall = camera.height_m * float(np.exp(lean.height))
+        near = nearest_ground(camera, lean)
+        rows = max(int((self.far - near) / self.side), 8)
+        columns = 2 * int(self.aside / self.side) + 1
+        corner = np.array([camera.x_m + near, -self.side * (columns // 2)])
+        to_pixels = _pixels_of_plane(camera, lean, fall)
+        # (column, row, 1) of the window to (ahead, left, 1) of the camera
+        grid = np.array([[0.0, self.side, near], [self.side, 0.0, corner[1]], [0.0, 0.0, 1.0]])
+        marks = mask.astype(np.uint8)
+        inner = marks[_BORDER:-_BORDER, _BORDER:-_BORDER].copy()
+        marks *= _CUT
+        marks[_BORDER:-_BORDER, _BORDER:-_BORDER] = inner
+        frame = np.zeros_like(marks)
+        frame[_BORDER:-_BORDER, _BORDER:-_BORDER] = 1
+        size = columns, rows
+        flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+        cells = cv2.warpPerspective(marks, to_pixels @ grid, size, flags=flags)
+        seen = cv2.warpPerspective(frame, to_pixels @ grid, size, flags=flags)
+        return GroundWindow(np.asarray(cells), np.asarray(seen, np.bool_), corner, self.side, fall)
+
+    def cut(
+        self, window: GroundWindow, camera: Camera, lean: Lean, radius: float | None, known: Array
+    ) -> Blobs:
+        """Find the plants in a window.
+
+        Args:
+            window: of `look`.
+            camera: rectified.
+            lean: as given to `look`.
+            radius: of a usual plant of the crop, m; None: not known, nothing is cut.
+            known: (K, 2) where plants are expected in the window's plane, ahead and left of base_link, m: what has
+                been cut once is cut again, so that plants do not come and go.
+        """
+        grown = (window.cells > 0).astype(np.uint8)
+        reach = max(int(0.5 * self.join / self.side + 0.5), 1)
+        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+        joined = cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel)
+        count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
+        labels = np.asarray(components, np.int32)
+        row, column = np.nonzero(grown)
+        label = labels[row, column].astype(np.intp)
+        if radius is not None:
+            count, label = self._separated(window, labels, row, column, label, count, radius, known)
+        amount = np.bincount(label, minlength=count).astype(np.float64)
+        cut = np.bincount(label, window.cells[row, column] == _CUT, count) > 0.0
+        edge = (row == len(grown) - 1) | (column == 0) | (column == grown.shape[1] - 1)
+        cut |= np.bincount(label, edge, count) > 0.0
+        kept = amount * self.side**2 >= self.least_area
+        amount = np.maximum(amount, 1.0)
+        middle = np.column_stack([np.bincount(label, part, count) / amount for part in (row, column)])
+        places = window.corner + self.side * middle
+        slopes = (places - np.array([camera.x_m, 0.0])) / window.fall
+        areas = np.minimum(amount, _disc(row, column, label, middle, slopes, amount)) * self.side**2
+        return Blobs(slopes[kept], areas[kept], ~cut[kept], lean)
+
+    def warm_up(self) -> None:
+        """Load or compile the kernel, so that the first picture is not kept waiting."""
+        from robot_vision.perception.crop_rows.plant_kernels import share_among_seeds
+
+        one = np.zeros(1, np.intp)
+        share_among_seeds(one.copy(), one, one, np.array([0, 1], np.intp), np.zeros((1, 2), np.intp), one)
+
+    def _separated(
+        self,
+        window: GroundWindow,
+        labels: NDArray[np.int32],
+        row: NDArray[np.intp],
+        column: NDArray[np.intp],
+        label: NDArray[np.intp],
+        count: int,
+        radius: float,
+        known: Array,
+    ) -> tuple[int, NDArray[np.intp]]:
+        """Cut blobs in which several bodies of a plant's size stand out; each cell goes to the nearest."""
+        size = np.bincount(label, minlength=count)
+        large = size * self.side**2 > _TOO_LARGE * np.pi * radius**2
+        large[0] = False
+        if not large.any():
+            return count, label
+        tops = _tops(window, radius / self.side)
+        index, inside = window.at(known)
+        seeds = index[inside]
+        if len(seeds):
+            away = np.linalg.norm(tops[:, None, :] - seeds[None, :, :], axis=2).min(axis=1)
+            tops = np.concatenate([seeds, tops[away > _NEW * radius / self.side]])
+        tops = tops[large[labels[tops[:, 0], tops[:, 1]]]]
+        if not len(tops):
+            return count, label
+        from robot_vision.perception.crop_rows.plant_kernels import share_among_seeds
+
+        of = labels[tops[:, 0], tops[:, 1]]
+        order = np.argsort(of, kind="stable")
+        first = np.searchsorted(of[order], np.arange(count + 1))
+        names = np.arange(count, count + len(tops))
+        share_among_seeds(label, row, column, first, tops[order], names)
+        count += len(tops)
+        return count, label
+
+
+def _disc(
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    label: NDArray[np.intp],
+    middle: Array,
+    slopes: Array,
+    amount: Array,
+) -> Array:
+    """Cells (N,) of discs as wide as blobs are across the sight: along it tall plants seem longer than they are."""
+    ahead = slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-9)[:, None]
+    across = (column - middle[label, 1]) * ahead[label, 0] - (row - middle[label, 0]) * ahead[label, 1]
+    # of a disc the variance is a quarter of the squared radius
+    return np.asarray(4.0 * np.pi * (np.bincount(label, across**2, len(amount)) / amount + 1.0 / 12.0))
+
+
+def row_radius(window: GroundWindow, rows: Array, spacing: float) -> float | None:
+    """Radius of the crop's plants from how wide its rows are, m; None where hardly anything grows.
+
+    What grows about a row scatters by half the radius of its plants; weeds, which stand anywhere, are told apart as
+    the part that is spread evenly.
+
+    Args:
+        window: the ground.
+        rows: (6,) as `RowsOnGround.values`.
+        spacing: between rows, m.
+    """
+    row, column = np.nonzero(window.cells[: int(_NEAR_M / window.side) : 2, ::2])
+    if len(row) < _FEWEST_CELLS:
+        return None
+    places = window.corner + 2.0 * window.side * np.column_stack([row, column])
+    aside = lateral(places[:, 0], places[:, 1], rows)[0]
+    aside -= spacing * np.round(aside / spacing)
+    share, edges = np.histogram(aside, _BINS, (-0.5 * spacing, 0.5 * spacing))
+    middle, share = 0.5 * (edges[1:] + edges[:-1]), share / share.sum()
+    even, sigma, mean = 0.3, 0.15 * spacing, 0.0
+    for _ in range(_ROUNDS):
+        bell = (1.0 - even) * np.exp(-0.5 * ((middle - mean) / sigma) ** 2) / (np.sqrt(2.0 * np.pi) * sigma)
+        own = bell / (bell + even / spacing)
+        even = float(np.clip(1.0 - own @ share, 0.01, 0.95))
+        mean = float((own * share) @ middle / (own @ share))
+        sigma = float(np.sqrt((own * share) @ (middle - mean) ** 2 / (own @ share)) + 1e-4)
+    return 2.0 * float(np.sqrt(max(sigma**2 - _SOWN**2, _SOWN**2 / 4.0)))
+
+
+def _tops(window: GroundWindow, radius: float) -> NDArray[np.intp]:
+    """Cells (M, 2) about which more grows than about their neighbours, for plants of a radius in cells."""
+    step = max(int(radius / _COARSE), 1)
+    height, width = (side // step * step for side in window.cells.shape)
+    grown = (window.cells[:height, :width] > 0).astype(np.float32)
+    share = grown.reshape(height // step, step, width // step, step).mean(axis=(1, 3))
+    body = cv2.GaussianBlur(share, (0, 0), _BODY * radius / step)
+    reach = max(int(_APART * radius / step), 1)
+    around = cv2.dilate(body, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
+    tops = np.argwhere((body >= around) & (body > _LEAST_BODY))
+    return np.asarray(tops * step + step // 2, np.intp)
+
+
+def nearest_ground(camera: Camera, lean: Lean) -> float:
+    """Nearest ground in the middle column of a picture, m ahead of the camera."""
+    ray = camera.rays([[0.5 * (camera.width - 1.0), camera.height - 1.0]])[0]
+    ray = rotation_from_rpy(lean.roll, lean.pitch, 0.0) @ camera.optical_to_base @ ray
+    assert camera.height_m is not None
+    return float(camera.height_m * np.exp(lean.height) * ray[0] / max(-ray[2], 1e-3))
+
+
+def _pixels_of_plane(camera: Camera, lean: Lean, fall: float) -> Array:
+    """Homography (3, 3) from a place (ahead, left, 1) of the camera on a plane so far below it to pixels."""
+    places = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -fall]])
+    to_body = rotation_from_rpy(lean.roll, lean.pitch, 0.0).T
+    return np.asarray(camera.matrix @ camera.optical_to_base.T @ to_body @ places)

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which nozzle of a boom is to open for which weed, and when; never where it would hit the crop, never blindly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_vision.mapping.plants import PlantKind, Plants
+
+Array = NDArray[np.float64]
+
+#: A nozzle is meant for a weed when its lane covers this share of the weed's radius about its middle, or so much, m.
+_AIM, _LEAST_AIM = 0.5, 0.008
+#: Slower than this nobody can say when a weed comes under the nozzle, m/s.
+_SLOWEST = 0.05
+
+
+class Fate(IntEnum):
+    """What became of a plant under the boom."""
+
+    CROP = 0
+    SPRAYED = 1
+    SPARED = 2
+    """A weed too near the crop."""
+    UNSURE = 3
+    """Not surely a weed, hence not sprayed."""
+
+
+@dataclass(frozen=True)
+class Spray:
+    """What is to be sprayed from now on.
+
+    Attributes:
+        weeds: (M,) plants to be sprayed; one that several lanes reach stands there several times.
+        lanes: (M,) nozzle of each, 0 the rightmost.
+        times: (M,) s until the middle of the weed is under the jet, less the latency: when to open the valve.
+        reason: in plain words why nothing is sprayed at all; empty when all is well.
+    """
+
+    weeds: Plants
+    lanes: NDArray[np.intp]
+    times: Array
+    reason: str = ""
+
+    def __len__(self) -> int:
+        return len(self.lanes)
+
+
+@dataclass
+class SprayPlanner:
+    """Plans for a row of nozzles.
+
+    Args:
+        lanes: number of nozzles.
+        width: of the lane of each, m; they lie side by side, the middle of the boom at y = 0.
+        boom_x: of the boom ahead of base_link, m; behind it is negative.
+        latency: from the command to the jet on the ground, s.
+        safety: distance kept from the leaves of the crop, m.
+        margin: sprayed before and behind a weed, m.
+
+    Raises:
+        ValueError: naming the setting that makes no sense.
+    """
+
+    lanes: int = 24
+    width: float = 0.04
+    boom_x: float = -0.3
+    latency: float = 0.1
+    safety: float = 0.02
+    margin: float = 0.01
+    counts: NDArray[np.intp] = field(
+        default_factory=lambda: np.zeros(len(Fate), np.intp), init=False, repr=False, compare=False
+    )
+    _ahead: dict[int, Fate] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.lanes <= 1000:
+            raise ValueError(f"lanes must lie in [1, 1000], not {self.lanes}")
+        if not (np.isfinite(self.width) and self.width > 0.0):
+            raise ValueError(f"width must be a positive number of metres, not {self.width}")
+        if not np.isfinite(self.boom_x):
+            raise ValueError(f"boom_x must be a number of metres, not {self.boom_x}")
+        for name in ("latency", "safety", "margin"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ValueError(f"{name} must not be negative, nor {getattr(self, name)}")
+
+    @property
+    def middles(self) -> Array:
+        """Distance (lanes,) of each lane's middle to the left of base_link, m."""
+        return np.asarray(self.width * (np.arange(self.lanes) - 0.5 * (self.lanes - 1)))
+
+    def reset(self) -> None:
+        """Forget the plants ahead, and the counts."""
+        self._ahead.clear()
+        self.counts[:] = 0
+
+    def plan(self, plants: Plants, speed: float | None, blind: str = "") -> Spray:
+        """Say what to spray and when.
+
+        Args:
+            plants: around the robot now.
+            speed: of the robot ahead, m/s; None: not known.
+            blind: why the plants are not to be relied on; nothing is sprayed then.
+        """
+        if speed is None:
+            blind = blind or "no odometry tells when a weed will be under the boom"
+        elif speed < _SLOWEST:
+            blind = blind or "the robot stands still"
+        if blind or speed is None:
+            self._count(plants, np.zeros(len(plants), bool), np.zeros(len(plants), bool))
+            return Spray(Plants.none(), np.zeros(0, np.intp), np.zeros(0), blind)
+        reached = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii
+        reached &= plants.places[:, 0] > self.boom_x - plants.radii - self.margin - self.latency * speed
+        weeds = np.flatnonzero((plants.kinds == PlantKind.WEED) & reached)
+        half = plants.radii[weeds] + self.margin
+        ahead = plants.places[weeds, 0] - self.boom_x
+        times = ahead / speed - self.latency
+        in_time = times > -half / speed
+        aim = np.maximum(_AIM * plants.radii[weeds], _LEAST_AIM)
+        across = np.abs(plants.places[weeds, 1, None] - self.middles[None, :])
+        meant = across < 0.5 * self.width + aim[:, None]
+        open_lanes = meant & ~self._over_crop(plants, weeds, half)
+        # The lane over the middle of a weed must be among those that may open
+        hit = (open_lanes & (across <= 0.5 * self.width + 1e-9)).any(axis=1)
+        weed, lane = np.nonzero(open_lanes & (hit & in_time)[:, None])
+        self._count(plants, _marked(plants, weeds[hit]), _marked(plants, weeds[meant.any(axis=1) & ~hit]))
+        return Spray(plants.take(weeds[weed]), lane, times[weed])
+
+    def _over_crop(self, plants: Plants, weeds: NDArray[np.intp], half: Array) -> NDArray[np.bool_]:
+        """Whether spraying each weed (M,) would reach the crop, or what may be crop, for each lane: (M, lanes)."""
+        wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii + self.safety
+        crop = np.flatnonzero((plants.kinds != PlantKind.WEED) & wide)
+        if not len(crop) or not len(weeds):
+            return np.zeros((len(weeds), self.lanes), np.bool_)
+        away = np.abs(plants.places[weeds, None, 0] - plants.places[None, crop, 0]) - half[:, None]
+        aside = np.abs(plants.places[crop, 1, None] - self.middles[None, :]) - 0.5 * self.width
+        reach = (plants.radii[crop] + self.safety)[None, :, None]
+        near = np.hypot(np.maximum(away, 0.0)[:, :, None], np.maximum(aside, 0.0)[None, :, :]) < reach
+        return np.asarray(near.any(axis=1))
+
+    def _count(self, plants: Plants, sprayed: NDArray[np.bool_], spared: NDArray[np.bool_]) -> None:
+        """Note what becomes of plants ahead, and count those that the boom has passed since the last picture."""
+        fates = np.full(len(plants), Fate.UNSURE)
+        fates[plants.kinds == PlantKind.CROP] = Fate.CROP
+        fates[spared] = Fate.SPARED
+        fates[sprayed] = Fate.SPRAYED
+        inside = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width
+        ahead = plants.places[:, 0] > self.boom_x
+        for number in plants.ids[~ahead].tolist():
+            if number in self._ahead:
+                self.counts[self._ahead.pop(number)] += 1
+        there = ahead & inside
+        self._ahead = {
+            number: Fate(fate)
+            for number, fate in zip(plants.ids[there].tolist(), fates[there].tolist(), strict=True)
+        }
+
+
+def _marked(plants: Plants, which: NDArray[np.intp]) -> NDArray[np.bool_]:
+    marked = np.zeros(len(plants), np.bool_)
+    marked[which] = True
+    return marked
