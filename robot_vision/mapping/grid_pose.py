@@ -16,6 +16,8 @@ from robot_vision.mapping.pose import Pose, PoseHistory
 Array = NDArray[np.float64]
 
 _QUARTER = np.pi / 2
+_SHADOW = 4.0
+"""Factor on the deviation of a face that seems nearer than it can be: floor may seem to end at the wall's shadow."""
 
 
 @dataclass
@@ -117,16 +119,21 @@ class GridPose:
         cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
         turned = ends @ np.array([[cos, sin], [-sin, cos]])
         for axis in (0, 1):
-            error = self._face_error(turned, axis, pose)
-            if error is not None:
-                self._correct(stamp_s, axis, error, (self.face_sigma * self.cell) ** 2 / trust)
+            for side in (-1.0, 1.0):
+                short = self._face_error(turned, axis, side, pose)
+                if short is not None:
+                    sigma = self.face_sigma * self.cell * (1.0 if short < 0.0 else _SHADOW)
+                    self._correct(stamp_s, axis, side * short, sigma**2 / trust)
 
-    def _face_error(self, ends: Array, axis: int, pose: Pose) -> float | None:
-        """By how much the robot is farther along an axis than believed, by the faces across it; None without any.
+    def _face_error(self, ends: Array, axis: int, side: float, pose: Pose) -> float | None:
+        """By how much the faces of walls across an axis lie nearer than the grid's lines; None without any.
 
         Args:
             ends: (K, 2) of the floor relative to the robot, turned into the maze, in the order of their bearing;
                 nan where it does not end.
+            axis: 0 or 1.
+            side: of the robot where the faces are: 1 up the axis, -1 down it.
+            pose: believed, of the robot.
         """
         step = np.full_like(ends, np.nan)
         step[2:-2] = ends[4:] - ends[:-4]
@@ -134,17 +141,17 @@ class GridPose:
             across = (np.abs(step[:, axis]) < 0.25 * np.abs(step[:, 1 - axis])) & (
                 np.abs(step[:, 1 - axis]) < 0.6 * self.cell
             )
+            across &= ends[:, axis] * side > 0.0
         faces = ends[across, axis]
         if len(faces) < 5:
             return None
-        lines = faces + np.sign(faces) * self.wall / 2 + (pose.x, pose.y)[axis]
-        off = lines / self.cell
-        off = (np.round(off) - off) * self.cell
-        middle = float(np.median(off))
-        near = np.abs(off - middle) < 0.08 * self.cell
+        lines = (faces + side * self.wall / 2 + (pose.x, pose.y)[axis]) / self.cell
+        short = side * (np.round(lines) - lines) * self.cell
+        middle = float(np.median(short))
+        near = np.abs(short - middle) < 0.08 * self.cell
         if near.sum() < 5 or near.mean() < 0.5 or abs(middle) > 0.3 * self.cell:
             return None
-        return float(off[near].mean())
+        return float(short[near].mean())
 
     def _correct(self, stamp_s: float, axis: int, error: float, variance: float) -> None:
         """Take in a measurement of x (0), y (1) or yaw (2) that differs from what is believed by `error`."""

@@ -258,7 +258,7 @@ class PlanViewMapper:
         part = lab[view.top :]
         strange = ""
         if self.appearance.knows:
-            like = self.appearance.score(part[-len(v) :]) > 0.0
+            like = np.asarray(self.appearance.score(part[-len(v) :]) > 0.0)
             share = float(like[sample[-len(v) :]].mean()) if sample.any() else 0.0
             if share < 0.3:
                 strange = "what is just before the robot looks like no floor seen so far"
@@ -268,7 +268,7 @@ class PlanViewMapper:
                     return strange
             else:
                 self._unlike = None
-                sample[-len(v) :] &= like | (share > 0.9)
+                sample[-len(v) :] &= like if share <= 0.9 else ~_from_above(like)
         self.appearance.learn(part, sample, lab[: max(view.top, 1)])
         self.shadows.learn(lower, sample)
         return strange
@@ -299,6 +299,14 @@ def _half(picture: Picture) -> Picture:
     size = (round(picture.shape[1] * 0.5), round(picture.shape[0] * 0.5))
     half = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     return np.asarray(half if half.ndim == 3 else cv2.cvtColor(half, cv2.COLOR_GRAY2BGR))
+
+
+def _from_above(like: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What reaches down from above (H, W) in columns of a picture before anything is like the floor.
+
+    New tints among those of the floor are floor, too; what comes in from above may be the foot of a wall.
+    """
+    return ~np.logical_or.accumulate(like, axis=0)
 
 
 def _unreadable(gray: Picture) -> str:

@@ -133,7 +133,7 @@ class MazeRunner:
             self._plan()
         before = self._route
         if self.stage == "done":
-            points, reason, seen = _NOWHERE, "the run is over", 0.0
+            points, reason, seen = self._points(pose), "the run is over", np.inf
         elif not self._ahead:
             points, reason, seen = _NOWHERE, self._reason, 0.0
         else:
@@ -154,6 +154,8 @@ class MazeRunner:
             return
         for number in range(_AHEAD + 1):
             direction = known.downhill(steps, place, towards)
+            if direction is None and number == 0 and self.stage == "proof":
+                direction = self._unseen(place)  # the question is one of this cell's own walls
             if direction is None:
                 break
             if not known.is_seen(place, direction):
@@ -164,6 +166,11 @@ class MazeRunner:
             self._ahead.append(place)
         if not self._ahead:
             self._reason = f"no way leads on from the cell {self._place} by what is known of the maze"
+
+    def _unseen(self, place: Cell) -> int | None:
+        """To where a cell has a wall that has not been seen, the least turn first; None if all have been."""
+        turns = ((self._towards + turn) % 4 for turn in (0, 1, 3, 2))
+        return next((way for way in turns if not self._known.is_seen(place, way)), None)
 
     def _step(self, pose: Pose) -> None:
         """Note that the robot is in another cell once it is well inside."""

@@ -17,10 +17,11 @@ _ALONG = np.linspace(-0.3, 0.3, 7)
 """Where a wall is looked at, cells from its middle: not at its ends, where others may meet it."""
 _LEAST = 4
 """Of these places must be seen: less may be a shadow, or the end of another wall."""
-_ACROSS = np.linspace(-0.12, 0.12, 7)
+_ACROSS = np.linspace(-0.24, 0.24, 9)
 """Of each of these places, cells across the wall."""
-_BEYOND = slice(4, 7)
-"""Of those, counted from the robot's side: floor seen here is seen through where the wall would be."""
+_AT, _BEYOND = slice(2, 7), slice(7, 9)
+"""Of those, counted from the robot's side, where a wall would end the floor, and where floor can be seen only if none
+stands there: a wall so near that its foot is below the picture fills the picture's columns."""
 
 
 @dataclass
@@ -85,7 +86,7 @@ class WallEvidence:
         cells = _looked_up(plan, places, pose).reshape(len(side), len(_ALONG), len(_ACROSS))
         from_beyond = away[side, row, column, side] < 0.0
         cells[from_beyond] = cells[from_beyond, :, ::-1]
-        taken = (cells >= _OCCUPIED).any(axis=2)
+        taken = (cells[:, :, _AT] >= _OCCUPIED).any(axis=2)
         through = (cells[:, :, _BEYOND] == _FREE).all(axis=2) & ~taken
         told = (taken | through).sum(axis=1)
         votes = np.where(told >= _LEAST, taken.sum(axis=1) - through.sum(axis=1), 0) / len(_ALONG)
