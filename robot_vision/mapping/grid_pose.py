@@ -110,12 +110,19 @@ class GridPose:
         for error, variance in zip(off, variances, strict=True):
             self._correct(stamp_s, 2, float(error), float(variance))
 
-    def see_plan(self, stamp_s: float, plan: PlanView, camera: Camera, trust: float = 1.0) -> None:
-        """Put the place right by the faces of walls in a plan of the floor in base_link; `trust` is its weight."""
+    def see_plan(self, stamp_s: float, plan: PlanView, eye: float, trust: float = 1.0) -> None:
+        """Put the place right by the faces of walls in a plan of the floor.
+
+        Args:
+            stamp_s: of the picture, s.
+            plan: in base_link.
+            eye: of the camera ahead of base_link, m.
+            trust: share of its usual weight.
+        """
         pose = self.at(stamp_s)
         if pose is None:
             return
-        ends = floor_ends(plan, camera.x_m, self.reach or 2.0 * self.cell)
+        ends = floor_ends(plan, eye, self.reach or 2.0 * self.cell)
         cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
         turned = ends @ np.array([[cos, sin], [-sin, cos]])
         for axis in (0, 1):

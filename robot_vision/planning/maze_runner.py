@@ -20,7 +20,7 @@ from robot_vision.planning.quest import Quest, Stage
 from robot_vision.planning.wall_evidence import WallEvidence
 
 _NOWHERE = np.zeros((0, 2))
-_ENTERED = 0.08
+_ENTERED = 0.1
 """Cells behind its border at which a robot is in the next cell."""
 _AHEAD = 3
 """Cells of the way that are told beyond the next one, so that the robot need not stop at each."""
@@ -112,13 +112,19 @@ class MazeRunner:
         """Take in vanishing points of a picture; see `GridPose.see_directions`."""
         self._pose.see_directions(stamp_s, directions, sigma, camera)
 
-    def see_plan(self, stamp_s: float, plan: PlanView, camera: Camera) -> None:
-        """Take in the plan of the floor of a picture: where the robot is among walls, and which walls there are."""
+    def see_plan(self, stamp_s: float, plan: PlanView, eye: float) -> None:
+        """Take in the plan of the floor of a picture: where the robot is among walls, and which walls there are.
+
+        Args:
+            stamp_s: of the picture, s.
+            plan: in base_link.
+            eye: of the camera ahead of base_link, m.
+        """
         pose = self._pose.at(stamp_s)
         if pose is None:
             return
         trust = self._novelty(pose)
-        self._pose.see_plan(stamp_s, plan, camera, trust)
+        self._pose.see_plan(stamp_s, plan, eye, trust)
         self._evidence.see(plan, self._pose.at(stamp_s) or pose, trust)
         self._stale = self._evidence.tell(self._known) or self._stale
 

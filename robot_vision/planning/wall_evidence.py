@@ -46,7 +46,7 @@ class WallEvidence:
     cell: float
     reach: float = 2.6
     near: float = 1.5
-    sure: float = 1.2
+    sure: float = 1.0
     limit: float = 4.0
     _odds: NDArray[np.float64] = field(init=False, repr=False)
     _told: NDArray[np.int8] = field(init=False, repr=False)
