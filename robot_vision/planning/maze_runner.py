@@ -12,13 +12,20 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.mapping import PlanView, Pose
 from robot_vision.mapping.grid_pose import GridPose
-from robot_vision.planning.grid import Cell, NoWayError, PlanningError
-from robot_vision.planning.known_maze import DIRECTIONS, KnownMaze, beside
+from robot_vision.planning.grid import Cell, PlanningError, checked_positive
+from robot_vision.planning.known_maze import KnownMaze, beside
 from robot_vision.planning.maze import Maze
 from robot_vision.planning.navigator import Route
 from robot_vision.planning.quest import Quest, Stage
 from robot_vision.planning.wall_evidence import WallEvidence
 
+_ABOUT: dict[Stage, str] = {
+    "goal": "looks for the goal",
+    "proof": "proves the shortest way",
+    "home": "goes home",
+    "run": "runs the shortest way",
+    "done": "the run is over",
+}
 _NOWHERE = np.zeros((0, 2))
 _ENTERED = 0.1
 """Cells behind its border at which a robot is in the next cell."""
@@ -67,6 +74,9 @@ class MazeRunner:
         for what, place in [("start", self.start), *(("goal", goal) for goal in self.goals)]:
             if not (0 <= place[0] < self.size[0] and 0 <= place[1] < self.size[1]):
                 raise PlanningError(f"the {what} {place} lies outside a maze of {self.size} cells")
+        checked_positive(self.wall, "wall")
+        if self.size[0] < 1 or self.size[1] < 1:
+            raise PlanningError(f"a maze has rows and columns, not {self.size}")
         if not self.goals:
             raise PlanningError("the maze has no goal")
         self._known = KnownMaze(self.size, self.start, self.goals)
@@ -93,6 +103,17 @@ class MazeRunner:
         return self._pose.pose
 
     @property
+    def sigma(self) -> NDArray[np.float64]:
+        """Standard deviations (3,) of its pose: x and y (m), yaw (rad)."""
+        return self._pose.sigma
+
+    @property
+    def summary(self) -> str:
+        """What it is about and how many steps it took in each stage, in one line."""
+        steps = ", ".join(f"{stage} {count}" for stage, count in self.steps.items()) or "none yet"
+        return f"{_ABOUT[self.stage]}; in the cell {self._place}; steps: {steps}"
+
+    @property
     def seen(self) -> Maze:
         """What it knows of the maze."""
         return self._known.as_maze()
@@ -101,6 +122,10 @@ class MazeRunner:
     def shortest_path(self) -> list[Cell]:
         """Cells of the shortest way from the start to a goal that is known by now; empty if none is."""
         return self._known.shortest_path()
+
+    def warm_up(self) -> None:
+        """Compile what plans."""
+        self._known.steps_from(self.goals)
 
     def move(self, stamp_s: float, odometry: Pose) -> None:
         """Take in a pose that odometry tells, in a frame of its own."""
@@ -134,10 +159,10 @@ class MazeRunner:
         if pose is None:
             return self._route
         self._step(pose)
+        number = self._route.number + self._stale
         if self._stale:
             self._stale = False
             self._plan()
-        before = self._route
         if self.stage == "done":
             points, reason, seen = self._points(pose), "the run is over", np.inf
         elif not self._ahead:
@@ -146,7 +171,7 @@ class MazeRunner:
             points, reason, seen = self._points(pose), "", np.inf
             if self._looks:
                 reason, seen = "looks whether a wall stands there", _way(points[:-1])
-        self._route = Route(points, seen, reason, number=before.number + 1, done=self.stage == "done")
+        self._route = Route(points, seen, reason, number=number, done=self.stage == "done")
         return self._route
 
     _reason = ""
@@ -218,6 +243,30 @@ class MazeRunner:
                 return _SAME_VIEW
         self._viewed = pose
         return 1.0
+
+
+def middle_goals(size: Cell) -> tuple[Cell, ...]:
+    """The goal cells of a contest: the one in the middle, or the four there where none is; at least one."""
+    rows, columns = size
+    middles = [sorted({(count - 1) // 2, count // 2}) for count in (rows, columns)]
+    return tuple((row, column) for row in middles[0] for column in middles[1])
+
+
+def cells_from_texts(texts: Sequence[str]) -> tuple[Cell, ...]:
+    """Cells told as texts, "row,column" each, row 0 in the south, column 0 in the west; empty texts are left out.
+
+    Raises:
+        PlanningError: naming the text that tells no cell.
+    """
+    found = []
+    for text in texts:
+        if not text.strip():
+            continue
+        parts = text.split(",")
+        if len(parts) != 2 or not all(part.strip().isdigit() for part in parts):
+            raise PlanningError(f"{text!r} is no cell: write row,column, for example 2,3")
+        found.append((int(parts[0]), int(parts[1])))
+    return tuple(found)
 
 
 def _way(points: NDArray[np.float64]) -> float:
