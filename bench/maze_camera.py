@@ -8,6 +8,7 @@ start and the goal cells are known, as in a contest. Steps are counted where the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +18,7 @@ from bench.maze_drives import contest_maze
 from bench.report import Cell, Row, Table, at_least, at_most
 from robot_vision.control import PathPursuit
 from robot_vision.mapping import PlanViewMapper, Pose
+from robot_vision.mapping.ground_lines import TALL_ONLY
 from robot_vision.perception import HeadingEstimator, LineDetector
 from robot_vision.planning import Exploration, Maze, MazeExplorer, MazeRunner
 from robot_vision.simulation.live import STANDING, LiveDrive, LiveSettings, OdometryAt
@@ -87,7 +89,8 @@ class Explorer:
         heading = round(1 - drive.world.beginning[2] / (np.pi / 2)) % 4
         self.runner = MazeRunner(maze.size, maze.goals, maze.start, heading, cell)
         self._camera = drive.world.camera
-        self._detector, self._estimator, self._mapper = LineDetector(), HeadingEstimator(), PlanViewMapper()
+        self._detector, self._estimator = LineDetector(), HeadingEstimator()
+        self._mapper = PlanViewMapper(lines=TALL_ONLY)
         self._pursuit = PathPursuit(**DRIVE)
         self._last = STANDING
 
@@ -116,7 +119,15 @@ class Explorer:
         return told.speed, told.turn_rate
 
 
-def explore(maze: Maze, seed: int = SEED, cell: float = CELL_M) -> CameraRun:
+Look = Callable[[Explorer, LiveDrive, float], None]
+
+
+def by_camera(mouse: Explorer, drive: LiveDrive, now: float) -> None:
+    """Show the explorer what the camera takes."""
+    mouse.look(drive.picture(), now)
+
+
+def explore(maze: Maze, seed: int = SEED, cell: float = CELL_M, look: Look = by_camera) -> CameraRun:
     """Explore a maze, prove the shortest way, go home and run it."""
     drive = LiveDrive(maze_world(maze, cell, seed), LiveSettings(rate=RATE), seed)
     mouse = Explorer(maze, drive, cell)
@@ -128,7 +139,7 @@ def explore(maze: Maze, seed: int = SEED, cell: float = CELL_M) -> CameraRun:
         mouse.move(readings)
         now, state = drive.time_ns * 1e-9, drive.state
         if number % STRIDE == 0:
-            mouse.look(drive.picture(), now)
+            look(mouse, drive, now)
         number += 1
         told = mouse.steer(now)
         there = int(state.y // cell), int(state.x // cell)

@@ -164,3 +164,7 @@ class GroundLines:
         slope = (view.horizon_rows[-1] - view.horizon_rows[0]) / (len(view.horizon_rows) - 1)
         below = v - (view.horizon_rows[0] + slope * u)
         return np.maximum(below, 0.0) / (view.camera.height_m or 1.0)
+
+
+TALL_ONLY = GroundLines(doubtful=0.0)
+"""Takes joints between slabs for no kerbs: for floors on which all that stands is tall."""

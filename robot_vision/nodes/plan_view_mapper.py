@@ -20,6 +20,7 @@ from std_msgs.msg import Header
 from robot_vision.geometry import Camera
 from robot_vision.mapping import OccupancyMap, PlanViewEstimate, PlanViewMapper, PoseHistory
 from robot_vision.mapping.clearance import Clearance
+from robot_vision.mapping.ground_lines import TALL_ONLY, GroundLines
 from robot_vision.mapping.plan_view import PlanViewMaker
 from robot_vision.perception import LineSegments, VanishingPoints
 from robot_vision.ros import calibration, floor_messages, messages, qos
@@ -56,6 +57,7 @@ class PlanViewMapperNode(VisionNode):
         Setting("robot.front", 0.3, "how far the robot's front lies ahead of base_link, m", -10.0, 10.0),
         Setting("robot.margin", 0.05, "kept free on both sides of it, m", 0.0, 5.0),
         Setting("reach", 7.0, "farthest floor spoken of, m", 0.5, 100.0),
+        Setting("kerbs", True, "whether floor of one colour may end at a line: not where all that stands is tall"),
         Setting("resolution", 0.05, "side of a cell of plan and map, m", 0.01, 1.0, live=False),
         Setting(
             "map.size",
@@ -108,6 +110,7 @@ class PlanViewMapperNode(VisionNode):
         self._calibration.move(camera_place(values))
         self._mapper.clearance = clearance
         self._mapper.reach = values["reach"]
+        self._mapper.lines = GroundLines() if values["kerbs"] else TALL_ONLY
 
     def warm_up(self) -> None:
         """Go once through all stages."""

@@ -87,7 +87,7 @@ class MazeRunner:
         self._place, self._towards = self.start, self.heading
         self._viewed: Pose | None = None
         self._ahead: list[Cell] = []
-        self._looks = False
+        self._looks, self._reason, self._walled_in = False, "", 0
         self._route = Route(_NOWHERE, 0.0, "no odometry yet")
         self._stale = True
         self.track, self.steps = [self.start], {}
@@ -164,7 +164,7 @@ class MazeRunner:
             self._stale = False
             self._plan()
         if self.stage == "done":
-            points, reason, seen = self._points(pose), "the run is over", np.inf
+            points, reason, seen = self._last_piece(pose), "the run is over", np.inf
         elif not self._ahead:
             points, reason, seen = _NOWHERE, self._reason, 0.0
         else:
@@ -173,8 +173,6 @@ class MazeRunner:
                 reason, seen = "looks whether a wall stands there", _way(points[:-1])
         self._route = Route(points, seen, reason, number=number, done=self.stage == "done")
         return self._route
-
-    _reason = ""
 
     def _plan(self) -> None:
         """The cells ahead, as far as nothing unseen lies between them."""
@@ -195,7 +193,11 @@ class MazeRunner:
                 return
             place, towards = beside(place, direction), direction
             self._ahead.append(place)
-        if not self._ahead:
+        if not self._ahead and self._walled_in != len(self.track):
+            self._walled_in = len(self.track)  # once in a cell: else what is so would be forgotten for ever
+            self._evidence.forget_walls(known)
+            self._plan()
+        elif not self._ahead:
             self._reason = f"no way leads on from the cell {self._place} by what is known of the maze"
 
     def _unseen(self, place: Cell) -> int | None:
@@ -230,6 +232,12 @@ class MazeRunner:
             beginning[axis] += off[axis]
             points.insert(0, beginning)
         return np.array(points)
+
+    def _last_piece(self, pose: Pose) -> NDArray[np.float64]:
+        """To the middle of the goal cell; nothing once the robot is about there."""
+        middle = self._middle(self._place)
+        left = np.hypot(middle[0] - pose.x, middle[1] - pose.y)
+        return self._points(pose) if left > _OFF_AXIS * self.cell else _NOWHERE
 
     def _middle(self, place: Cell) -> tuple[float, float]:
         return (place[1] + 0.5) * self.cell, (place[0] + 0.5) * self.cell

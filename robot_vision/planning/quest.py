@@ -46,7 +46,7 @@ class Quest:
             self._stage = "home"
         if self._stage == "home" and cell == known.start:
             self._stage = "run"
-        elif self._stage == "run" and cell in known.goals:
+        if self._stage == "run" and cell in known.goals:
             self._stage = "done"
         if self._stage == "done":
             return None

@@ -23,6 +23,9 @@ _AT, _BEYOND = slice(2, 7), slice(7, 9)
 """Of those, counted from the robot's side, where a wall would end the floor, and where floor can be seen only if none
 stands there: a wall so near that its foot is below the picture fills the picture's columns."""
 
+_WITHIN = 0.45
+"""Cells from the middle of a wall within which a view leads through it."""
+
 
 @dataclass
 class WallEvidence:
@@ -88,11 +91,25 @@ class WallEvidence:
         cells[from_beyond] = cells[from_beyond, :, ::-1]
         taken = (cells[:, :, _AT] >= _OCCUPIED).any(axis=2)
         through = (cells[:, :, _BEYOND] == _FREE).all(axis=2) & ~taken
+        through &= self._crossed(side, away[side, row, column])
         told = (taken | through).sum(axis=1)
         votes = np.where(told >= _LEAST, taken.sum(axis=1) - through.sum(axis=1), 0) / len(_ALONG)
         weight = trust / (1.0 + (distance[side, row, column] / self.near) ** 2)
         odds = self._odds[side, row, column] + votes * weight
         self._odds[side, row, column] = np.clip(odds, -self.limit, self.limit)
+
+    def _crossed(self, side: NDArray[np.intp], away: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether the view of each place beyond a wall (N, 7) leads through that wall and not past its end.
+
+        Args:
+            side: (N,) 0 for walls that run north and south, 1 for the others.
+            away: (N, 2) from the robot to their middles, m.
+        """
+        number = np.arange(len(side))
+        across, along = np.abs(away[number, side]), away[number, 1 - side]
+        share = across / (across + _ACROSS[_BEYOND][-1] * self.cell)
+        places = along[:, None] + self.cell * _ALONG
+        return np.asarray(np.abs(places * share[:, None] - along[:, None]) < _WITHIN * self.cell)
 
     def tell(self, known: KnownMaze) -> bool:
         """Note in a maze what is known by now; returns whether that is more than before, or something else."""
@@ -102,6 +119,13 @@ class WallEvidence:
             known.see((int(row), int(column)), 1 - int(side), bool(state[side, row, column] > 0))
         self._told = state.astype(np.int8)
         return len(changed) > 0
+
+    def forget_walls(self, known: KnownMaze) -> None:
+        """Take back all walls, openings stay: for a robot that finds itself walled in, so that one cannot be so."""
+        for side, row, column in np.argwhere(self._told > 0):
+            known.forget((int(row), int(column)), 1 - int(side))
+        self._odds[self._told > 0] = 0.0
+        self._told[self._told > 0] = 0
 
 
 def _looked_up(plan: PlanView, places: NDArray[np.float64], pose: Pose) -> NDArray[np.int8]:

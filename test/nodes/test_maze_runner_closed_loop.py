@@ -33,7 +33,7 @@ def test_the_graph_explores_a_maze_by_its_camera_and_runs_the_shortest_way(tmp_p
     file = tmp_path / "corner.maze"
     maze.write(file)
     place = {"camera.height": 1 / 3, "camera.pitch": 0.2618, "camera.x": 1 / 9}
-    mapper = {**place, "robot.width": 0.45}
+    mapper = {**place, "robot.width": 0.45, "kerbs": False}
     goal = ",".join(str(part) for part in maze.goals[0])
     runner_settings = {**place, **DRIVE, "rows": 2, "columns": 2, "goals": [goal], "timeout": 2.0}
     with Graph() as graph:
