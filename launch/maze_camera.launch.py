@@ -2,7 +2,7 @@
 """A maze in the simulator, explored by one camera and odometry and then run the shortest way.
 
 ros2 launch robot_vision maze_camera.launch.py rows:=4 columns:=4 seed:=5
-ros2 launch robot_vision maze_camera.launch.py file:=contest.maze rows:=16 columns:=16 "goals:=['7,7','7,8','8,7','8,8']"
+ros2 launch robot_vision maze_camera.launch.py file:=contest.maze rows:=16 columns:=16 lockstep:=true
 """
 
 from __future__ import annotations

@@ -213,6 +213,4 @@ def _composed(first: Pose, then: Pose) -> Pose:
 
 def _inverted(pose: Pose) -> Pose:
     cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
-    return Pose(
-        float(-cos * pose.x - sin * pose.y), float(sin * pose.x - cos * pose.y), float(-pose.yaw)
-    )
+    return Pose(float(-cos * pose.x - sin * pose.y), float(sin * pose.x - cos * pose.y), float(-pose.yaw))

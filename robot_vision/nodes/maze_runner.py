@@ -165,10 +165,13 @@ class MazeRunnerNode(VisionNode):
             self._maze.publish(seen)
         if not self._enabled:
             return
-        steering = self._pursuit.update(route.points, tuple(pose), stamp_s, route.seen)
+        place = pose.x, pose.y, pose.yaw
+        steering = self._pursuit.update(route.points, place, stamp_s, route.seen)
         self._say(steering.speed, steering.turn_rate)
         if not len(route.points):
-            self.diagnostics.report(Level.WARN, f"stands still: {route.reason}", "turn the robot, or start anew")
+            self.diagnostics.report(
+                Level.WARN, f"stands still: {route.reason}", "turn the robot, or start anew"
+            )
             return
         self.diagnostics.report(Level.OK, self._runner.summary)
         if self._runner.stage != self._stage:

@@ -29,6 +29,8 @@ _ABOUT: dict[Stage, str] = {
 _NOWHERE = np.zeros((0, 2))
 _ENTERED = 0.1
 """Cells behind its border at which a robot is in the next cell."""
+_CREEP = 0.15
+"""Cells behind its border up to which a robot may drive into a cell of which it has not seen all walls."""
 _AHEAD = 3
 """Cells of the way that are told beyond the next one, so that the robot need not stop at each."""
 _OFF_AXIS = 0.15
@@ -87,7 +89,7 @@ class MazeRunner:
         self._place, self._towards = self.start, self.heading
         self._viewed: Pose | None = None
         self._ahead: list[Cell] = []
-        self._looks, self._reason, self._walled_in = False, "", 0
+        self._looks, self._caution, self._reason, self._walled_in = False, False, "", 0
         self._route = Route(_NOWHERE, 0.0, "no odometry yet")
         self._stale = True
         self.track, self.steps = [self.start], {}
@@ -163,20 +165,35 @@ class MazeRunner:
         if self._stale:
             self._stale = False
             self._plan()
+            self._caution = self._cautious()
         if self.stage == "done":
             points, reason, seen = self._last_piece(pose), "the run is over", np.inf
         elif not self._ahead:
             points, reason, seen = _NOWHERE, self._reason, 0.0
         else:
             points, reason, seen = self._points(pose), "", np.inf
+            if self._caution:
+                seen = self._up_to_border(pose)
             if self._looks:
                 reason, seen = "looks whether a wall stands there", _way(points[:-1])
         self._route = Route(points, seen, reason, number=number, done=self.stage == "done")
         return self._route
 
     def _plan(self) -> None:
+        """The cells ahead; where there are none, the walls least sure are doubted, once in each cell."""
+        self._look_ahead()
+        if self._ahead or self.stage == "done":
+            return
+        if self._walled_in != len(self.track):
+            self._walled_in = len(self.track)
+            while not self._ahead and self._evidence.forget_weakest(self._known):
+                self._look_ahead()
+        if not self._ahead:
+            self._reason = f"no way leads on from the cell {self._place} by what is known of the maze"
+
+    def _look_ahead(self) -> None:
         """The cells ahead, as far as nothing unseen lies between them."""
-        self._ahead, self._reason, self._looks = [], "", False
+        self._ahead, self._looks = [], False
         known, place, towards = self._known, self._place, self._towards
         steps = self._quest.field(place)
         if steps is None:
@@ -186,19 +203,24 @@ class MazeRunner:
             if direction is None and number == 0 and self.stage == "proof":
                 direction = self._unseen(place)  # the question is one of this cell's own walls
             if direction is None:
-                break
+                return
             if not known.is_seen(place, direction):
                 if number == 0:
                     self._ahead, self._looks = [beside(place, direction)], True
                 return
             place, towards = beside(place, direction), direction
             self._ahead.append(place)
-        if not self._ahead and self._walled_in != len(self.track):
-            self._walled_in = len(self.track)  # once in a cell: else what is so would be forgotten for ever
-            self._evidence.forget_walls(known)
-            self._plan()
-        elif not self._ahead:
-            self._reason = f"no way leads on from the cell {self._place} by what is known of the maze"
+
+    def _cautious(self) -> bool:
+        """Whether what is seen of the next cell can still change the way: then the robot must be able to stop."""
+        if self.stage not in ("goal", "proof") or not self._ahead or self._looks:
+            return False
+        return any(not self._known.is_seen(self._ahead[0], direction) for direction in range(4))
+
+    def _up_to_border(self, pose: Pose) -> float:
+        """Metres of the way to just behind the border of the next cell, from where the way begins."""
+        points = self._points(pose)
+        return _way(points[: len(points) - len(self._ahead)]) + (0.5 + _CREEP) * self.cell
 
     def _unseen(self, place: Cell) -> int | None:
         """To where a cell has a wall that has not been seen, the least turn first; None if all have been."""
@@ -227,7 +249,8 @@ class MazeRunner:
         points = [here, *(np.array(self._middle(place)) for place in self._ahead)]
         off = np.array([pose.x, pose.y]) - here
         axis = int(np.argmax(np.abs(off)))
-        if abs(off[axis]) > _OFF_AXIS * self.cell:
+        on_its_way = len(points) > 1 and float(off @ (points[1] - here)) > 0.7 * np.hypot(*off) * self.cell
+        if abs(off[axis]) > _OFF_AXIS * self.cell and not on_its_way:
             beginning = here.copy()
             beginning[axis] += off[axis]
             points.insert(0, beginning)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which walls of a maze of square cells stand: evidence of many plans of the floor, each seen from where the robot was."""
+"""Which walls of a maze of square cells stand: evidence of many plans of the floor, seen from where the robot was."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ class WallEvidence:
         cell: side of a cell, m.
         reach: farthest wall looked at, cells.
         near: distance at which a plan counts half, cells.
-        sure: log-odds from which a wall is known to stand, or not to.
+        sure: log-odds from which a wall is known to stand; shadows look like walls, nothing looks like an opening.
+        open: log-odds from which it is known not to stand.
         limit: greatest amount of the log-odds: what was seen wrongly can be unseen.
 
     Raises:
@@ -48,14 +49,15 @@ class WallEvidence:
     size: Cell
     cell: float
     reach: float = 2.6
-    near: float = 1.5
-    sure: float = 1.0
+    near: float = 2.0
+    sure: float = 1.3
+    open: float = 1.0
     limit: float = 4.0
     _odds: NDArray[np.float64] = field(init=False, repr=False)
     _told: NDArray[np.int8] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("cell", "reach", "near", "sure", "limit"):
+        for name in ("cell", "reach", "near", "sure", "open", "limit"):
             checked_positive(getattr(self, name), name)
         rows, columns = self.size
         self._odds = np.zeros((2, rows, columns))
@@ -65,9 +67,7 @@ class WallEvidence:
         north = np.stack([column + 0.5, row + 1.0], axis=-1)
         self._middles = self.cell * np.stack([east, north])
         along, across = (self.cell * part.ravel() for part in np.meshgrid(_ALONG, _ACROSS, indexing="ij"))
-        self._offsets = np.stack(
-            [np.stack([across, along], axis=-1), np.stack([along, across], axis=-1)]
-        )
+        self._offsets = np.stack([np.stack([across, along], axis=-1), np.stack([along, across], axis=-1)])
 
     @property
     def odds(self) -> NDArray[np.float64]:
@@ -113,19 +113,25 @@ class WallEvidence:
 
     def tell(self, known: KnownMaze) -> bool:
         """Note in a maze what is known by now; returns whether that is more than before, or something else."""
-        state = np.where(self._odds >= self.sure, 1, np.where(self._odds <= -self.sure, -1, self._told))
+        state = np.where(self._odds >= self.sure, 1, np.where(self._odds <= -self.open, -1, self._told))
         changed = np.argwhere(state != self._told)
         for side, row, column in changed:
             known.see((int(row), int(column)), 1 - int(side), bool(state[side, row, column] > 0))
         self._told = state.astype(np.int8)
         return len(changed) > 0
 
-    def forget_walls(self, known: KnownMaze) -> None:
-        """Take back all walls, openings stay: for a robot that finds itself walled in, so that one cannot be so."""
-        for side, row, column in np.argwhere(self._told > 0):
-            known.forget((int(row), int(column)), 1 - int(side))
-        self._odds[self._told > 0] = 0.0
-        self._told[self._told > 0] = 0
+    def forget_weakest(self, known: KnownMaze) -> bool:
+        """Take back the wall there is least evidence of; False if there is none.
+
+        A robot that finds itself walled in has seen a wall that is not there.
+        """
+        places = np.argwhere(self._told > 0)
+        if not len(places):
+            return False
+        side, row, column = (int(part) for part in places[np.argmin(self._odds[tuple(places.T)])])
+        known.forget((row, column), 1 - side)
+        self._odds[side, row, column] = self._told[side, row, column] = 0
+        return True
 
 
 def _looked_up(plan: PlanView, places: NDArray[np.float64], pose: Pose) -> NDArray[np.int8]:

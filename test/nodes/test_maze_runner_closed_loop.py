@@ -68,6 +68,9 @@ def test_the_graph_explores_a_maze_by_its_camera_and_runs_the_shortest_way(tmp_p
     steps = dict(part.split() for part in line.partition("steps: ")[2].split(", "))
     assert driven["contacts"] == 0
     assert int(steps["run"]) == len(perfect.shortest_path) - 1
-    assert sum(int(steps[stage]) for stage in ("goal", "proof", "home") if stage in steps) <= 1.3 * perfect.steps_home
+    assert (
+        sum(int(steps[stage]) for stage in ("goal", "proof", "home") if stage in steps)
+        <= 1.3 * perfect.steps_home
+    )
     assert driven["way_m"] > 5.0
     assert driven["without_steering"] <= 1

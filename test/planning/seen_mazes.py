@@ -18,16 +18,20 @@ EYE = 1 / 9
 CAMERA = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=1 / 3, pitch=0.2618, x_m=EYE)
 
 
-def plan_from(maze: Maze, pose: Pose, noise: float = 0.0, random: np.random.Generator | None = None) -> PlanView:
+def plan_from(
+    maze: Maze, pose: Pose, noise: float = 0.0, random: np.random.Generator | None = None
+) -> PlanView:
     """The plan of the floor seen from a pose in a maze of cells of 1 m; `noise` (m) is of where floor ends."""
     bearings = np.linspace(-HALF_VIEW, HALF_VIEW, 241)
     eye = np.array([pose.x + EYE * np.cos(pose.yaw), pose.y + EYE * np.sin(pose.yaw)])
-    ends = np.array([_distance(maze, eye, pose.yaw + bearing) for bearing in bearings])
+    ends = _distances(maze, eye, pose.yaw + bearings)
     if random is not None:
         ends += noise * random.standard_normal(len(ends))
     ends = np.maximum(ends, NEAR)
     rows, columns = round(2 * HALF_WIDTH / RESOLUTION), round(LENGTH / RESOLUTION)
-    x, y = np.meshgrid((np.arange(columns) + 0.5) * RESOLUTION, (np.arange(rows) + 0.5) * RESOLUTION - HALF_WIDTH)
+    x, y = np.meshgrid(
+        (np.arange(columns) + 0.5) * RESOLUTION, (np.arange(rows) + 0.5) * RESOLUTION - HALF_WIDTH
+    )
     away, bearing = np.hypot(x - EYE, y), np.arctan2(y, x - EYE)
     seen = (np.abs(bearing) < HALF_VIEW) & (away > NEAR)
     end = ends[np.clip(np.rint((bearing + HALF_VIEW) / (2 * HALF_VIEW) * 240).astype(int), 0, 240)]
@@ -45,18 +49,17 @@ def directions_from(yaw: float) -> NDArray[np.float64]:
     return np.asarray(np.where(found[:, 2:] < 0.0, -found, found))
 
 
-def _distance(maze: Maze, eye: NDArray[np.float64], angle: float) -> float:
-    """From a place to the nearest face of a wall along a ray, m."""
-    ray = np.array([np.cos(angle), np.sin(angle)])
-    nearest = np.inf
+def _distances(maze: Maze, eye: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """From a place to the nearest face of a wall along rays (N,), m."""
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])
+    nearest = np.full(len(angles), np.inf)
     for axis, walls in ((0, maze.upright), (1, maze.across.T)):
-        if abs(ray[axis]) < 1e-9:
-            continue
         for line in range(walls.shape[1]):
-            face = line - np.sign(ray[axis]) * WALL / 2
-            way = (face - eye[axis]) / ray[axis]
-            along = eye[1 - axis] + way * ray[1 - axis]
-            here = int(np.floor(along))
-            if 0.0 < way < nearest and 0 <= here < len(walls) and walls[here, line]:
-                nearest = float(way)
+            face = line - np.sign(rays[:, axis]) * WALL / 2
+            with np.errstate(divide="ignore", invalid="ignore"):
+                way = (face - eye[axis]) / rays[:, axis]
+                along = eye[1 - axis] + way * rays[:, 1 - axis]
+            inside = np.isfinite(way) & (way > 0.0) & (along >= 0.0) & (along < len(walls))
+            here = np.where(inside, along, 0.0).astype(int)
+            nearest = np.where(inside & walls[here, line], np.fmin(nearest, way), nearest)
     return nearest

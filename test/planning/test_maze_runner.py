@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mazes explored by plans of the floor and odometry that drifts, without pictures; one with them stands in test/nodes."""
+"""Mazes explored by plans of the floor and odometry that drifts, without pictures (test/nodes has one with them)."""
 
 from __future__ import annotations
 

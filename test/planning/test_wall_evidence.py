@@ -53,12 +53,13 @@ def test_one_look_is_not_enough_and_walls_can_be_taken_back() -> None:
             assert not evidence.tell(known)
     assert evidence.tell(known)
     assert not known.is_open((0, 0), 1)
-    evidence.forget_walls(known)
+    assert evidence.forget_weakest(known)
+    assert not evidence.forget_weakest(known)
     assert known.is_open((0, 0), 1)
     assert not known.is_seen((0, 0), 1)
 
 
-@pytest.mark.parametrize("name", ["cell", "reach", "near", "sure", "limit"])
+@pytest.mark.parametrize("name", ["cell", "reach", "near", "sure", "open", "limit"])
 def test_settings_that_make_no_sense_are_refused(name: str) -> None:
     with pytest.raises(PlanningError, match=name):
         WallEvidence((2, 2), **{"cell": 1.0, name: -1.0})
