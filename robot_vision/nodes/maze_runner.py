@@ -22,7 +22,8 @@ from std_srvs.srv import SetBool
 
 from robot_vision.control.pursuit import PathPursuit
 from robot_vision.nodes.maze_planner import DRIVE_SETTINGS
-from robot_vision.planning.maze_runner import MazeRunner, cells_from_texts, middle_goals
+from robot_vision.planning.maze_cells import cells_from_texts, middle_goals
+from robot_vision.planning.maze_runner import MazeRunner
 from robot_vision.ros import calibration, floor_messages, maps, messages, qos
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
