@@ -46,6 +46,7 @@ class GroundLines:
         step: difference of the mean score of these strips that makes a line a border.
         doubtful: mean score of the worse one above which it is floor whatever the other one is.
         snap: distance over which the end of the floor is drawn to a border, working pixels.
+        kerbs: whether floor may end at a border where nothing else tells so.
     """
 
     aside: float = float(np.deg2rad(1.0))
@@ -53,6 +54,7 @@ class GroundLines:
     step: float = 0.9
     doubtful: float = 1.8
     snap: float = 2.5
+    kerbs: bool = True
 
     def sort(
         self,
@@ -123,7 +125,7 @@ class GroundLines:
         """
         strips = np.zeros(score.shape, np.uint8)
         chosen = np.flatnonzero(kinds == LineKind.BORDER)
-        if not len(chosen):
+        if not len(chosen) or not self.kerbs:
             return strips.astype(bool)
         ends = lines.endpoints[chosen] * view.scale + (view.scale - 1.0) / 2.0
         left, right = self._sides(ends, score, view, self.strip)
@@ -166,5 +168,5 @@ class GroundLines:
         return np.maximum(below, 0.0) / (view.camera.height_m or 1.0)
 
 
-TALL_ONLY = GroundLines(doubtful=0.0)
+TALL_ONLY = GroundLines(kerbs=False)
 """Takes joints between slabs for no kerbs: for floors on which all that stands is tall."""
