@@ -20,6 +20,7 @@ CLASSES = {
     "vp_estimator": "VpEstimatorNode",
     "corridor_steering": "CorridorSteeringNode",
     "maze_planner": "MazePlannerNode",
+    "maze_runner": "MazeRunnerNode",
     "crop_row_steering": "CropRowSteeringNode",
     "plan_view_mapper": "PlanViewMapperNode",
     "bag_player": "BagPlayer",

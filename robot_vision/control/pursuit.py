@@ -10,14 +10,18 @@ from numpy.typing import NDArray
 
 from robot_vision.control.limits import CommandClock, Steering, approach, speed_to_stop_within
 
+_LOOKS_AT = 0.15
+"""Radians to the side at which a robot still looks at the way before it."""
+
 
 @dataclass
 class PathPursuit:
     """Pure pursuit of a way (Coulter 1992), within limits of speed, turn rate and acceleration.
 
     The robot aims at the point of the way `lookahead` metres on from the point of it that is nearest to the robot.
-    When that lies more than `turn_on_spot` to the side, it stands and turns first. What was said last is still under
-    way when the next pose comes: the pose is carried on by `latency` seconds of it before the robot aims.
+    When that lies more than `turn_on_spot` to the side, it stands and turns first. Where its way leads over what nobody
+    has seen it stands and turns to look there. What was said last is still under way when the next pose comes: the
+    pose is carried on by `latency` seconds of it before the robot aims.
 
     Args:
         speed: on a straight way, m/s.
@@ -77,14 +81,16 @@ class PathPursuit:
         along, target, left = _ahead(points, (x, y), self.lookahead)
         away = target - (x, y)
         distance = float(np.hypot(*away))
+        hidden = left > max(seen - along, self.lookahead)
         left = min(left, seen - along)
         room = min(left, distance) if left <= self.lookahead else left
-        if room <= 1e-3:
+        bearing = float((np.arctan2(away[1], away[0]) - yaw + np.pi) % (2 * np.pi) - np.pi)
+        looks = room <= 1e-3 and hidden and abs(bearing) > _LOOKS_AT
+        if room <= 1e-3 and not looks:
             self.reset()
             return Steering(0.0, 0.0)
-        bearing = float((np.arctan2(away[1], away[0]) - yaw + np.pi) % (2 * np.pi) - np.pi)
         most = speed_to_stop_within(room, self.most_acceleration)
-        if abs(bearing) > self.turn_on_spot:
+        if looks or abs(bearing) > self.turn_on_spot:
             wanted, turn = 0.0, self._turn_towards(bearing)
         else:
             wanted = min(self.speed * max(0.15, 1.0 - self.slowing * abs(bearing)), most)

@@ -94,6 +94,7 @@ class PlanViewMapper:
         trusted: relative error of a distance beyond which nothing is said; it limits the reach, too.
         unchecked: weight in the map of a picture that could not be held against an earlier one.
         slip: share of the way that odometry may be wrong by before its pictures stay out of the map.
+        low_borders: whether floor may end at a line beyond which nothing stands up; not where all that stands is tall.
         horizon, appearance, motion, evidence, shadows, finder, lines, kerbs, objects, maker, clearance, features, map:
             the stages.
 
@@ -105,6 +106,7 @@ class PlanViewMapper:
     trusted: float = 0.2
     unchecked: float = 0.25
     slip: float = 0.1
+    low_borders: bool = True
     horizon: HorizonFilter = field(default_factory=HorizonFilter)
     appearance: FloorAppearance = field(default_factory=FloorAppearance)
     motion: PlaneMotion = field(default_factory=PlaneMotion)
@@ -224,8 +226,9 @@ class PlanViewMapper:
         if points is not None:
             dim = self.shadows.dim(lower)
             kinds, borders = self.lines.sort(lines, points, score, dim, view)
-            borders = borders.joined(self._kerbs(lines, kinds, points, score, dim, lab[top:], view, pose))
-        score[self.lines.cut(borders, score.shape, view)] = -1.0
+            if self.low_borders:
+                borders = borders.joined(self._kerbs(lines, kinds, points, score, dim, lab[top:], view, pose))
+                score[self.lines.cut(borders, score.shape, view)] = -1.0
         boundary = self.finder.find(score, sharp(gray, 4.0, 4)[top:], gray, view, reach)
         straight = self.lines.straighten(boundary, borders, view)
         on_border = straight.rows != boundary.rows
@@ -278,7 +281,7 @@ class PlanViewMapper:
         part = lab[view.top :]
         strange = ""
         if self.appearance.knows:
-            like = self.appearance.score(part[-len(v) :]) > 0.0
+            like = np.asarray(self.appearance.score(part[-len(v) :]) > 0.0)
             share = float(like[sample[-len(v) :]].mean()) if sample.any() else 0.0
             if share < 0.3:
                 strange = "what is just before the robot looks like no floor seen so far"
@@ -288,7 +291,7 @@ class PlanViewMapper:
                     return strange
             else:
                 self._unlike = None
-                sample[-len(v) :] &= like | (share > 0.9)
+                sample[-len(v) :] &= like if share <= 0.9 else ~_from_above(like)
         self.appearance.learn(part, sample, lab[: max(view.top, 1)])
         self.shadows.learn(lower, sample)
         return strange
@@ -319,6 +322,14 @@ def _half(picture: Picture) -> Picture:
     size = (round(picture.shape[1] * 0.5), round(picture.shape[0] * 0.5))
     half = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     return np.asarray(half if half.ndim == 3 else cv2.cvtColor(half, cv2.COLOR_GRAY2BGR))
+
+
+def _from_above(like: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What reaches down from above (H, W) in columns of a picture before anything is like the floor.
+
+    New tints among those of the floor are floor, too; what comes in from above may be the foot of a wall.
+    """
+    return ~np.logical_or.accumulate(like, axis=0)
 
 
 def _unreadable(gray: Picture) -> str:

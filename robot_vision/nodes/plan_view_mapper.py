@@ -57,6 +57,9 @@ class PlanViewMapperNode(VisionNode):
         Setting("robot.front", 0.3, "how far the robot's front lies ahead of base_link, m", -10.0, 10.0),
         Setting("robot.margin", 0.05, "kept free on both sides of it, m", 0.0, 5.0),
         Setting("reach", 7.0, "farthest floor spoken of, m", 0.5, 100.0),
+        Setting(
+            "kerbs", True, "whether floor of one colour may end at a line: not where all that stands is tall"
+        ),
         Setting("resolution", 0.05, "side of a cell of plan and map, m", 0.01, 1.0, live=False),
         Setting(
             "map.size",
@@ -111,6 +114,7 @@ class PlanViewMapperNode(VisionNode):
         self._calibration.move(camera_place(values))
         self._mapper.clearance = clearance
         self._mapper.reach = values["reach"]
+        self._mapper.low_borders = values["kerbs"]
 
     def warm_up(self) -> None:
         """Go once through all stages."""

@@ -88,6 +88,7 @@ class Simulator(VisionNode):
         ),
         Setting("delay", 0.03, "from a picture until its steering takes effect, s", 0.0, 1.0, live=False),
         Setting("seconds", 0.0, "end after so long, simulated s; 0: with the lane", 0.0, 1e6, live=False),
+        Setting("end_with_lane", True, "end where the lane is over, too", live=False),
         Setting("start.offset", 0.0, "start so far left of the usual place, m", -100.0, 100.0, live=False),
         Setting("start.yaw", 0.0, "start turned by so much, rad, counter-clockwise", -3.2, 3.2, live=False),
         Setting("vehicle", "differential", "what is driven", None, None, VEHICLES, False),
@@ -246,7 +247,8 @@ class Simulator(VisionNode):
             self.get_logger().error(f"touched {self._drive.score.touched} after {self._drive.way:.2f} m")
         self._report()
         seconds = self.settings["seconds"]
-        if self._drive.at_the_end or (seconds and self._drive.time_ns >= seconds * 1e9):
+        over = self.settings["end_with_lane"] and self._drive.at_the_end
+        if over or (seconds and self._drive.time_ns >= seconds * 1e9):
             self._end()
             return
         self._show(readings)

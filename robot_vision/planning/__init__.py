@@ -11,10 +11,13 @@ from robot_vision.planning.frontiers import frontiers
 from robot_vision.planning.grid import NoWayError, PlanningError
 from robot_vision.planning.maze import Maze, MazeError
 from robot_vision.planning.maze_grid import maze_from_grid, maze_to_grid
+from robot_vision.planning.maze_runner import MazeRunner
 from robot_vision.planning.navigator import Navigator, Route
 from robot_vision.planning.path import nearest_reachable, plan_path
 from robot_vision.planning.pictures import draw_field, draw_maze, letters
+from robot_vision.planning.quest import Quest
 from robot_vision.planning.speed_run import Racer, SpeedRun, fastest_run, shortest_run
+from robot_vision.planning.wall_evidence import WallEvidence
 
 __all__ = [
     "ExactField",
@@ -23,12 +26,15 @@ __all__ = [
     "Maze",
     "MazeError",
     "MazeExplorer",
+    "MazeRunner",
     "Navigator",
     "NoWayError",
     "PlanningError",
+    "Quest",
     "Racer",
     "Route",
     "SpeedRun",
+    "WallEvidence",
     "connected_field",
     "cost_field",
     "descend",

@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A mouse in a maze it has never seen: to the goal, on until its shortest way is proven, and home.
 
-1. At each cell it sees the walls around it. What it has not seen counts as open.
-2. Until a goal is reached, it steps down the distance function of the goals over what may be open (flood fill).
-3. Then the shortest way one may still hope for is compared with the shortest way known. While the first is
-   shorter, it goes to the nearest cell beside an unseen wall that lies on one of the ways hoped for: whatever it
-   finds there settles a question that has to be settled.
-4. When both are equal, no wall that is unseen can make a shorter way. It goes home on openings it knows.
+At each cell it sees the walls around it. What it has not seen counts as open. Where it goes says `quest`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from robot_vision.planning.grid import Cell, NoWayError
+from robot_vision.planning.grid import Cell
 from robot_vision.planning.known_maze import DIRECTIONS, KnownMaze, beside
 from robot_vision.planning.maze import Maze
+from robot_vision.planning.quest import Quest
 
 
 @dataclass(frozen=True)
@@ -60,29 +56,17 @@ class MazeExplorer:
         maze = self._maze
         known = KnownMaze(maze.size, maze.start, maze.goals)
         cell, heading, track = maze.start, self._heading, [maze.start]
+        quest, steps = Quest(known), {"goal": 0, "proof": 0, "home": 0}
         look_around(maze, known, cell)
-        to_goal: int | None = 0 if cell in maze.goals else None
-        to_proof: int | None = None
-        while True:
-            if to_goal is None:
-                targets = list(maze.goals)
-            elif to_proof is None and not known.is_proven():
-                targets = known.open_questions()
-            else:
-                to_proof = len(track) - 1 if to_proof is None else to_proof
-                if cell == maze.start:
-                    break
-                targets = [maze.start]
-            steps = known.steps_from(targets, surely=to_proof is not None)
-            direction = known.downhill(steps, cell, heading)
-            if direction is None:
-                raise NoWayError(f"no way leads from the start {maze.start} to a goal of the maze")
+        while (direction := quest.direction(cell, heading)) is not None and quest.stage in steps:
+            steps[quest.stage] += 1
             heading, cell = direction, beside(cell, direction)
             track.append(cell)
             look_around(maze, known, cell)
-            if to_goal is None and cell in maze.goals:
-                to_goal = len(track) - 1
-        return Exploration(to_goal, to_proof, len(track) - 1, known.shortest_path(), track, known.as_maze())
+        to_proof = steps["goal"] + steps["proof"]
+        return Exploration(
+            steps["goal"], to_proof, len(track) - 1, known.shortest_path(), track, known.as_maze()
+        )
 
 
 def look_around(maze: Maze, known: KnownMaze, cell: Cell) -> None:

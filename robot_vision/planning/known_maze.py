@@ -49,6 +49,14 @@ class KnownMaze:
             self._open[place] = not wall
             self._seen[place] = True
 
+    def forget(self, cell: Cell, direction: int) -> None:
+        """Take back what was noted of a wall within the maze: it counts as open and has not been seen."""
+        place = self._place(cell, direction)
+        there = beside(cell, direction)
+        if place is not None and there[0] < self.size[0] and there[1] < self.size[1]:
+            self._open[place] = True
+            self._seen[place] = False
+
     def is_seen(self, cell: Cell, direction: int) -> bool:
         """Whether it is known if a wall stands there."""
         place = self._place(cell, direction)

@@ -15,6 +15,7 @@ from std_msgs.msg import Header
 from robot_vision.geometry.rotation import quaternion_to_rotation, rpy_from_rotation
 from robot_vision.mapping import GroundPoints, PlanView
 from robot_vision.mapping import Pose as PlanarPose
+from robot_vision.ros.maps import floor_map_from_message
 from robot_vision.ros.messages import MessageError, check_finite, cloud_from_points
 
 GROUND_POINTS_LAYOUT = np.dtype(
@@ -37,6 +38,21 @@ def plan_to_message(header: Header, plan: PlanView, frame: str) -> OccupancyGrid
         ),
         data=array.array("b", plan.cells.tobytes()),
     )
+
+
+def plan_from_message(message: OccupancyGrid) -> PlanView:
+    """Read `plan_view`.
+
+    Raises:
+        MessageError: it is not in base_link, is turned, holds another number of cells than it says, or no numbers.
+    """
+    if message.header.frame_id != "base_link":
+        raise MessageError(f"the plan is in the frame {message.header.frame_id!r}; base_link is understood")
+    floor = floor_map_from_message(message)
+    x, y, yaw = floor.origin
+    if yaw != 0.0:
+        raise MessageError("the plan is turned against base_link")
+    return PlanView(floor.cells, floor.resolution, (x, y))
 
 
 def ground_points_to_message(header: Header, points: GroundPoints | None) -> PointCloud2:

@@ -7,8 +7,8 @@ import array
 import math
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
@@ -16,7 +16,12 @@ from std_msgs.msg import Header
 from robot_vision.geometry.rotation import quaternion_to_rotation
 from robot_vision.planning.floor_map import FloorMap
 from robot_vision.planning.grid import PlanningError
+from robot_vision.planning.maze import Maze
+from robot_vision.planning.maze_grid import maze_to_grid
 from robot_vision.ros.messages import MessageError, check_finite
+
+_CELLS = 8
+"""Cells of a map from one wall of a maze to the next."""
 
 
 def floor_map_from_message(message: OccupancyGrid) -> FloorMap:
@@ -70,6 +75,37 @@ def field_to_message(header: Header, field: NDArray[np.float64]) -> Image:
         step=4 * columns,
         data=array.array("B", field.astype("<f4").tobytes()),
     )
+
+
+def maze_to_message(header: Header, maze: Maze, cell: float, frame: str) -> OccupancyGrid:
+    """Build the map of a maze of cells of `cell` metres; its frame has its origin in the south-western corner."""
+    cells = maze_to_grid(maze, _CELLS, 1)
+    resolution = cell / _CELLS
+    origin = Pose()
+    origin.position.x = origin.position.y = -resolution / 2
+    info = MapMetaData(
+        map_load_time=header.stamp,
+        resolution=resolution,
+        width=cells.shape[1],
+        height=cells.shape[0],
+        origin=origin,
+    )
+    own = Header(stamp=header.stamp, frame_id=frame)
+    return OccupancyGrid(header=own, info=info, data=array.array("b", cells.tobytes()))
+
+
+def place_to_message(
+    header: Header, place: tuple[float, float, float], sigma: NDArray[np.float64], frame: str
+) -> PoseWithCovarianceStamped:
+    """Build the message of a place x, y (m) and yaw (rad) with their standard deviations (3,)."""
+    message = PoseWithCovarianceStamped(header=Header(stamp=header.stamp, frame_id=frame))
+    pose = message.pose.pose
+    pose.position.x, pose.position.y = place[0], place[1]
+    pose.orientation.z, pose.orientation.w = math.sin(place[2] / 2), math.cos(place[2] / 2)
+    covariance = np.zeros(36)
+    covariance[[0, 7, 35]] = sigma**2
+    message.pose.covariance = covariance
+    return message
 
 
 def _planar(pose: Pose, name: str) -> tuple[float, float, float]:

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot among walls on a grid: odometry that drifts is put right by vanishing points and by faces of walls."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robot_vision.mapping import GridPose, PlanView, Pose
+from robot_vision.mapping.grid_pose import floor_ends
+from robot_vision.planning import Maze
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "planning"))
+
+from seen_mazes import CAMERA, EYE, WALL, directions_from, plan_from  # noqa: E402
+
+HALL = Maze.parse(
+    "+---+---+---+---+\n| S             |\n+   +---+---+   +\n|             G |\n+---+---+---+---+\n"
+)
+
+
+def lap(step: float = 0.1) -> list[Pose]:
+    """Poses of a robot that goes round the hall, turning on the spot in its corners."""
+    corners = np.array([(0.5, 0.5), (3.5, 0.5), (3.5, 1.5), (0.5, 1.5), (0.5, 0.5)])
+    poses = []
+    for side, (begin, end) in enumerate(zip(corners, corners[1:], strict=False)):
+        yaw, length = side * np.pi / 2, float(np.hypot(*(end - begin)))
+        for part in np.arange(0.0, length, step) / length:
+            poses.append(Pose(*(begin + part * (end - begin)).tolist(), yaw))
+        poses += [Pose(*end.tolist(), yaw + turn) for turn in np.arange(0.0, np.pi / 2, 0.15)]
+    return poses
+
+
+def driven(corrected: bool, laps: int = 2) -> tuple[float, float]:
+    """Worst error of place (m) and of yaw (rad) with wheels that are 3 % wrong, over the last lap."""
+    random = np.random.default_rng(1)
+    truth = lap() * laps
+    odometry = np.zeros(3)
+    pose = GridPose(truth[0], 1.0, WALL)
+    pose.move(0.0, Pose(*odometry.tolist()))
+    worst = np.zeros(2)
+    for number, (before, now) in enumerate(zip(truth, truth[1:], strict=False), start=1):
+        way = float(np.hypot(now.x - before.x, now.y - before.y)) * 1.02
+        odometry[2] += ((now.yaw - before.yaw + np.pi) % (2 * np.pi) - np.pi) * 1.03 + random.normal(
+            0.0, 0.002
+        )
+        odometry[:2] += way * np.cos(odometry[2]), way * np.sin(odometry[2])
+        stamp = 0.1 * number
+        pose.move(stamp, Pose(*odometry.tolist()))
+        if corrected:
+            seen = directions_from(now.yaw + random.normal(0.0, 0.003))
+            pose.see_directions(stamp, seen, np.full(2, 0.004), CAMERA)
+            pose.see_plan(stamp, plan_from(HALL, now, 0.02, random), EYE)
+        told = pose.pose
+        assert told is not None
+        if number > len(truth) * (laps - 1) // laps:
+            turn = (told.yaw - now.yaw + np.pi) % (2 * np.pi) - np.pi
+            worst = np.maximum(worst, (np.hypot(told.x - now.x, told.y - now.y), abs(turn)))
+    return float(worst[0]), float(worst[1])
+
+
+def test_walls_and_vanishing_points_hold_what_odometry_loses() -> None:
+    place, yaw = driven(corrected=True)
+    assert place < 0.06
+    assert yaw < np.deg2rad(1.5)
+    lost_place, lost_yaw = driven(corrected=False)
+    assert lost_place > 0.3
+    assert lost_yaw > np.deg2rad(10.0)
+
+
+def test_a_vanishing_point_far_off_is_not_believed() -> None:
+    pose = GridPose(Pose(0.5, 0.5, 0.0), 1.0, WALL)
+    pose.move(0.0, Pose(0.0, 0.0, 0.0))
+    pose.see_directions(0.0, directions_from(0.6), np.full(2, 0.004), CAMERA)
+    assert pose.pose == pytest.approx(Pose(0.5, 0.5, 0.0))
+
+
+def test_without_odometry_there_is_no_place() -> None:
+    pose = GridPose(Pose(0.5, 0.5, 0.0), 1.0, WALL)
+    pose.see_plan(0.0, plan_from(HALL, Pose(0.5, 0.5, 0.0)), EYE)
+    assert pose.pose is None
+    assert pose.at(0.0) is None
+
+
+def test_floor_that_was_not_seen_up_to_its_end_tells_no_end() -> None:
+    cells = np.full((160, 160), -1, np.int8)
+    cells[60:100, 10:14] = 100
+    assert np.isnan(floor_ends(PlanView(cells, 0.05, (0.0, -4.0)), EYE, 2.0)).all()
+    cells[60:100, 2:10] = 0
+    ends = floor_ends(PlanView(cells, 0.05, (0.0, -4.0)), EYE, 2.0)
+    assert ends[45] == pytest.approx((0.5, 0.0), abs=0.03)
+
+
+@pytest.mark.parametrize("name", ["cell", "wall", "way_drift", "turn_drift", "direction_floor", "face_sigma"])
+def test_settings_that_make_no_sense_are_refused(name: str) -> None:
+    given = {"start": Pose(0.5, 0.5, 0.0), "cell": 1.0, "wall": WALL, name: 0.0}
+    with pytest.raises(ValueError, match=name):
+        GridPose(**given)  # type: ignore[arg-type]
