@@ -90,8 +90,8 @@ def view(
     if target is Target.FILE:
         recording.disconnect()
     if complain is not None:
-        for topic, cause in faults.items():
-            complain(f"{topic}: not all of it is shown: {cause}")
+        for topic, fault in faults.items():
+            complain(f"{topic}: not all of it is shown: {fault}")
     return done
 
 
