@@ -10,7 +10,7 @@ look's cost allows, and goes along with the primary vanishing point until the ne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class Attention:
         every: pictures from one look at the whole picture to the next at the latest.
         least_support: share of what the last whole look promised that vanishing points must keep.
         least_lines: share of the lines promised that must be found.
-        jump: change of roll or pitch between two pictures that is a surprise, rad.
+        jump: change of roll or pitch, or of a head's pan or tilt, between two pictures that is a surprise, rad.
         margin: kept free around what the region is laid out for, rad.
 
     Attributes:
@@ -128,7 +128,10 @@ class Attention:
         late = self.asked is None and self.searched_in_part(lines)
         self._waited += 1
         before, self._leans = self._leans, None if attitude is None else (attitude.roll, attitude.pitch)
+        head = _head_moved(self._camera, points.camera)
         self.reason = self._surprise(lines, points, before, step)
+        if max(head) > self.jump:
+            self.reason = "the head turns"
         self._camera = points.camera
         primary = points.of(Role.PRIMARY)
         if late and not self.reason:
@@ -152,7 +155,7 @@ class Attention:
             return None
         seconds = min(step, _LONGEST_STEP) if np.isfinite(step) else _LONGEST_STEP
         turned = seconds * (_UNKNOWN_TURN if turn_rate is None else abs(turn_rate))
-        room = (self.margin + turned, 0.5 * self.margin + 0.5 * seconds * _NOD)
+        room = (self.margin + turned + head[0], 0.5 * self.margin + 0.5 * seconds * _NOD + head[1])
         region = self._layout.region(points, primary, up, room)
         if region is None:
             self.reason = "the vanishing line leaves the picture"
@@ -179,7 +182,9 @@ class Attention:
             return ""
         if not 0.0 < step <= _LONGEST_STEP:
             return "pictures are far apart"
-        if points.camera != self._camera:
+        if self._camera is None or points.camera != replace(
+            self._camera, pan=points.camera.pan, tilt=points.camera.tilt
+        ):
             return "another camera"
         if int(points.ids[primary]) != self._lead:
             return "another way ahead"
@@ -193,3 +198,8 @@ class Attention:
         ):
             return "little support"
         return ""
+
+
+def _head_moved(before: Camera | None, now: Camera) -> tuple[float, float]:
+    """How far the head that carries a camera has panned and tilted from picture to picture, rad."""
+    return (0.0, 0.0) if before is None else (abs(now.pan - before.pan), abs(now.tilt - before.tilt))

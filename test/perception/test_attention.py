@@ -182,6 +182,18 @@ def test_a_word_that_comes_late_does_not_pass_a_part_off_as_the_whole(late: int)
     assert min(lagging) > 0.9 * min(usual)
 
 
+@pytest.mark.parametrize(("swing", "reason"), [(0.002, ""), (0.2, "the head turns")])
+def test_a_head_may_tremble_and_is_looked_after_when_it_turns(swing: float, reason: str) -> None:
+    robot = Robot()
+    for picture in range(12):
+        camera = replace(CAMERA, pan=0.1 + swing * (-1) ** picture)
+        lines = seen_in(seen_lines(HALL, 0.2, 0.05, robot.random, camera), robot.attention.asked)
+        answer = robot.way.update(lines, camera, picture / RATE, turn_rate=0.0)
+        assert answer.lane is not None
+        if picture > 1:
+            assert robot.attention.reason == reason
+
+
 def test_a_camera_upside_down_is_given_no_region() -> None:
     """The floor, and what tells, is above then."""
     robot, camera = Robot(), replace(CAMERA, roll=math.pi)
