@@ -337,11 +337,14 @@ def view(
 
     from robot_vision.viewer import Target, view
 
+    def warn(text: str) -> None:
+        typer.echo(f"warning: {text}", err=True)
+
     if web and save is not None:
         raise typer.BadParameter("a file is not shown in a browser: choose --save or --web")
     target = Target.BROWSER if web else Target.WINDOW if save is None else Target.FILE
     with _progress("messages") as progress:
-        count = view(bag, target, save, progress)
+        count = view(bag, target, save, progress, warn)
     typer.echo(f"{count} messages {f'in {save}' if save is not None else 'shown'}")
     if web:
         signal.sigwait({signal.SIGINT, signal.SIGTERM})

@@ -112,6 +112,44 @@ def test_a_bag_of_nothing_that_can_be_seen_is_refused_by_name(tmp_path: Path) ->
         view(tmp_path / "clock.mcap", Target.FILE, tmp_path / "x.rrd")
 
 
+def test_a_message_that_is_none_is_named_and_all_others_are_shown(tmp_path: Path) -> None:
+    kind = "sensor_msgs/msg/Image"
+    good = messages.image(1, "camera", np.zeros((2, 3), np.uint8))
+    odd = messages.image(1, "camera", np.zeros((2, 3), np.uint8), "64FC1")
+    turned = messages.imu(1, "base_link", (0.0, 0.0, 0.0, 0.0), np.zeros((3, 3)))
+    with BagWriter(tmp_path / "odd.mcap") as bag:
+        for topic, message in (("/image", good), ("/odd", odd), ("/image", good), ("/odd", odd)):
+            bag.write(topic, kind, 1, message)
+        bag.write("/attitude", "sensor_msgs/msg/Imu", 1, turned)
+    said: list[str] = []
+    assert view(tmp_path / "odd.mcap", Target.FILE, tmp_path / "odd.rrd", complain=said.append) == 2
+    assert len(said) == 2
+    assert "/odd" in said[0] and "64FC1" in said[0]
+    assert "/attitude" in said[1] and "quaternion" in said[1]
+    with BagWriter(tmp_path / "none.mcap") as bag:
+        bag.write("/odd", kind, 1, odd)
+    with pytest.raises(ViewerError, match="64FC1"):
+        view(tmp_path / "none.mcap", Target.FILE, tmp_path / "none.rrd")
+
+
+def test_a_distance_function_is_shown_as_its_map_with_its_first_row_below() -> None:
+    metres = np.array([[0.0, 1.0], [2.0, np.inf]], np.float32)
+    path, drawn = one("distance_field", "sensor_msgs/msg/Image", messages.image(1, "odom", metres))
+    assert path == "plan/distance_field"
+    shown_rows = np.frombuffer(bytes(drawn.buffer.as_arrow_array().to_pylist()[0]), np.float32)
+    assert shown_rows.tolist() == [2.0, np.inf, 0.0, 1.0]
+
+
+def test_the_bag_itself_is_not_written_over(tmp_path: Path) -> None:
+    bag = tmp_path / "drive.mcap"
+    bag.write_bytes(CORRIDOR.read_bytes())
+    with pytest.raises(ViewerError, match="the bag itself"):
+        view(bag, Target.FILE, tmp_path / "." / "drive.mcap")
+    assert bag.read_bytes() == CORRIDOR.read_bytes()
+    with pytest.raises(ViewerError, match="No such file"):
+        view(bag, Target.FILE, tmp_path / "nowhere" / "x.rrd")
+
+
 def test_without_the_viewer_one_line_says_how_to_get_it() -> None:
     code = "import sys; sys.modules['rerun'] = None; from robot_vision.cli import main; main()"
     run = subprocess.run(

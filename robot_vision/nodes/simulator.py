@@ -2,7 +2,8 @@
 """Drives a vehicle through a simulated world as `steering` says, and shows the graph what its camera sees.
 
 With `head.on` the camera sits on a head that turns to where `look_at` says, and says how it stands on `joint_states`;
-in lockstep each picture then waits for its `look_at` too, where somebody says it.
+in lockstep each picture then waits for its `look_at` too, where somebody says it. Where none comes in time none is
+waited for any more until one is heard: who advertises it may have nothing to say.
 
 Lockstep: the world stands still from a picture until the `steering` with the stamp of that picture has come.
 What belongs to a picture (odometry up to it, /clock, calibration, truth) is sent before it, and its receipt by
@@ -122,6 +123,7 @@ class Simulator(VisionNode):
         self._steering = self.hear(TwistStamped, "steering", self._hear_steering, EVERY)
         head = self._drive.head is not None
         self._looks = self.hear(PointStamped, "look_at", self._hear_look_at, NEWEST) if head else None
+        self._look_at_comes = True
         self._awaited_nodes = AwaitedNodes(self, given["wait_for_nodes"])
         self._known: dict[str, int] = {}
         self._settled = 0
@@ -219,8 +221,11 @@ class Simulator(VisionNode):
 
     def _hear_look_at(self, message: PointStamped) -> None:
         if self._drive.head is not None and self._begun and not self._ended:
-            self._drive.head.look_at(point_from_message(message))
-            self._answered("look_at", stamp_ns(message))
+            self._look_at_comes = True
+            try:
+                self._drive.head.look_at(point_from_message(message))
+            finally:  # one that cannot be looked at is an answer, too
+                self._answered("look_at", stamp_ns(message))
 
     def _answered(self, topic: str, stamp: int) -> None:
         if self._lockstep and stamp == self._awaited_ns:
@@ -229,13 +234,18 @@ class Simulator(VisionNode):
                 self._go_on()
 
     def _time_is_over(self) -> None:
-        """In lockstep: no steering came in time. Else: the next picture is due."""
+        """In lockstep: no steering, or nowhere to look, came in time. Else: the next picture is due."""
         if self._lockstep:
-            self._unanswered += 1
-            missing = " and no ".join(sorted(self._awaited_topics)) or "steering"
-            waited = f"no {missing} to the picture at {self._drive.time_ns / 1e9:.2f} s came within "
-            will = "drives on with the last command" if self._drive.obeys else "stands"
-            self.complain("steering", f"{waited}{self.settings['lockstep_timeout']:g} s; the vehicle {will}")
+            picture = f"the picture at {self._drive.time_ns / 1e9:.2f} s"
+            within = f"came within {self.settings['lockstep_timeout']:g} s"
+            if self._awaited_topics == {"look_at"}:
+                self._look_at_comes = False
+                advice = "look at /diagnostics of who says it: camera.height may be missing"
+                self.complain("look_at", f"none to {picture} {within}; no other one is waited for", advice)
+            else:
+                self._unanswered += 1
+                will = "drives on with the last command" if self._drive.obeys else "stands"
+                self.complain("steering", f"no steering to {picture} {within}; the vehicle {will}")
         self._go_on()
 
     def _go_on(self) -> None:
@@ -272,7 +282,7 @@ class Simulator(VisionNode):
         picture = self._format.say(now, self._drive.picture())
         self.diagnostics.processing_ms = 1e3 * (time.perf_counter() - began)
         self._awaited_ns, self._awaited_topics = now, {"steering"}
-        if self._looks is not None and self._looks.get_publisher_count():
+        if self._looks is not None and self._look_at_comes and self._looks.get_publisher_count():
             self._awaited_topics.add("look_at")
         self._outputs[picture.topic].publish(encode(picture.message))
         self._pictures += 1

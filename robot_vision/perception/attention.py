@@ -10,7 +10,7 @@ look's cost allows, and goes along with the primary vanishing point until the ne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 _UNKNOWN_TURN, _NOD = 0.15, 0.15
 #: Pictures farther apart in time than this start afresh, s; between nearer ones things move a while besides, s.
 _LONGEST_STEP = 0.5
+#: Where lines are found so busily that the word to look everywhere comes late, so many pictures are still looked at in
+#: part. They are told by their lines: none lies outside the region by more than this share of the picture's width.
+_LATE, _RIM = 2, 0.02
 
 
 @dataclass
@@ -39,7 +42,7 @@ class Attention:
         every: pictures from one look at the whole picture to the next at the latest.
         least_support: share of what the last whole look promised that vanishing points must keep.
         least_lines: share of the lines promised that must be found.
-        jump: change of roll or pitch between two pictures that is a surprise, rad.
+        jump: change of roll or pitch, or of a head's pan or tilt, between two pictures that is a surprise, rad.
         margin: kept free around what the region is laid out for, rad.
 
     Attributes:
@@ -63,6 +66,8 @@ class Attention:
     _lead: int | None = field(default=None, init=False, repr=False, compare=False)
     _leans: tuple[float, float] | None = field(default=None, init=False, repr=False, compare=False)
     _camera: Camera | None = field(default=None, init=False, repr=False, compare=False)
+    _before: Region | None = field(default=None, init=False, repr=False, compare=False)
+    _waited: int = field(default=0, init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -79,7 +84,24 @@ class Attention:
     def reset(self) -> None:
         """Forget what earlier pictures told: look everywhere next."""
         self.asked, self.reason = None, "start"
-        self._layout = self._stamp = self._leans = None
+        self._layout = self._stamp = self._leans = self._before = None
+
+    def searched_in_part(self, lines: LineSegments) -> bool:
+        """Whether the lines of the picture that comes next, by all that is known, are those of a region alone."""
+        if self.asked is not None:
+            return True
+        if self._before is None or self._camera is None or self._waited >= _LATE:
+            return False
+        rim = _RIM * self._camera.width
+        low = np.array([self._before.left, self._before.top]) - rim
+        high = np.array([self._before.right, self._before.bottom]) + rim
+        ends = lines.endpoints.reshape(-1, 2)
+        return bool(np.all((ends >= low) & (ends <= high)))
+
+    def _look_everywhere(self) -> None:
+        if self.asked is not None:
+            self._before, self._waited = self.asked, 0
+        self.asked = self._layout = None
 
     def update(
         self,
@@ -103,12 +125,19 @@ class Attention:
         """
         step = np.inf if self._stamp is None else stamp_s - self._stamp
         self._stamp = stamp_s
+        late = self.asked is None and self.searched_in_part(lines)
+        self._waited += 1
         before, self._leans = self._leans, None if attitude is None else (attitude.roll, attitude.pitch)
+        head = _head_moved(self._camera, points.camera)
         self.reason = self._surprise(lines, points, before, step)
+        if max(head) > self.jump:
+            self.reason = "the head turns"
         self._camera = points.camera
         primary = points.of(Role.PRIMARY)
+        if late and not self.reason:
+            self.reason = "an older region is still searched"
         if self.reason or primary is None:
-            self.asked = self._layout = None
+            self._look_everywhere()
             return None
         up = points.camera.optical_to_base[2] if attitude is None else attitude.up
         if self._layout is None:
@@ -117,21 +146,22 @@ class Attention:
             self._lead = int(points.ids[primary])
             if self._layout is None:
                 self.reason = "no part of the picture holds enough of what leads ahead"
-                self.asked = None
+                self._look_everywhere()
                 return None
         self._pictures += 1
         if self._pictures >= self.every:
             self.reason = "whole picture due"
-            self.asked = self._layout = None
+            self._look_everywhere()
             return None
         seconds = min(step, _LONGEST_STEP) if np.isfinite(step) else _LONGEST_STEP
         turned = seconds * (_UNKNOWN_TURN if turn_rate is None else abs(turn_rate))
-        room = (self.margin + turned, 0.5 * self.margin + 0.5 * seconds * _NOD)
-        self.asked = self._layout.region(points, primary, up, room)
-        if self.asked is None:
+        room = (self.margin + turned + head[0], 0.5 * self.margin + 0.5 * seconds * _NOD + head[1])
+        region = self._layout.region(points, primary, up, room)
+        if region is None:
             self.reason = "the vanishing line leaves the picture"
-            self._layout = None
-        return self.asked
+            self._look_everywhere()
+        self.asked = region
+        return region
 
     def _surprise(
         self, lines: LineSegments, points: VanishingPoints, before: tuple[float, float] | None, step: float
@@ -152,7 +182,9 @@ class Attention:
             return ""
         if not 0.0 < step <= _LONGEST_STEP:
             return "pictures are far apart"
-        if points.camera != self._camera:
+        if self._camera is None or points.camera != replace(
+            self._camera, pan=points.camera.pan, tilt=points.camera.tilt
+        ):
             return "another camera"
         if int(points.ids[primary]) != self._lead:
             return "another way ahead"
@@ -166,3 +198,8 @@ class Attention:
         ):
             return "little support"
         return ""
+
+
+def _head_moved(before: Camera | None, now: Camera) -> tuple[float, float]:
+    """How far the head that carries a camera has panned and tilted from picture to picture, rad."""
+    return (0.0, 0.0) if before is None else (abs(now.pan - before.pan), abs(now.tilt - before.tilt))

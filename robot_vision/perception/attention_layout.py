@@ -169,11 +169,11 @@ def _evenly_around(column: float, beside: float, floor: Array) -> NDArray[np.boo
 
 
 def vanishing_rows(points: VanishingPoints, primary: int, up: Array, columns: Array) -> Array | None:
-    """Rows of the vanishing line through the primary point at some columns; None where it stands upright."""
+    """Rows of the vanishing line through the primary point at some columns; None where the floor is not below it."""
     camera: Camera = points.camera
     ahead = points.directions[primary]
     level = normalised(up - float(up @ ahead) * ahead)
-    if abs(level[1]) < 0.5:
+    if not level[1] <= -0.5:
         return None
     across = (columns - camera.cx) / camera.fx
     return np.asarray(camera.cy - camera.fy * (level[0] * across + level[2]) / level[1])

@@ -174,7 +174,8 @@ class WayEstimator:
         turn_rate: float | None,
     ) -> WayEstimate:
         seen = self.corridor.update(lines, camera, stamp_s, turn_rate)
-        if not self._look_for_road(seen, stamp_s):
+        partly = self.attention is not None and self.attention.searched_in_part(lines)
+        if not self._look_for_road(seen, stamp_s, partly):
             return self._in_corridor(seen)
         if camera.height_m is None or not camera.focal_known:
             if self.kind is Kind.AUTO:
@@ -194,13 +195,12 @@ class WayEstimator:
     def _expects_road(self, stamp_s: float) -> bool:
         return self._road_seen is not None and 0.0 <= stamp_s - self._road_seen <= _ROAD_COMES_BACK
 
-    def _look_for_road(self, seen: HeadingEstimate, stamp_s: float) -> bool:
+    def _look_for_road(self, seen: HeadingEstimate, stamp_s: float, partly: bool) -> bool:
         """Whether the way may be a road: as told, or because no walls stand about."""
         if self.kind is not Kind.AUTO:
             return self.kind is Kind.ROAD
         vertical = seen.vanishing_points.of(Role.VERTICAL)
         walls = vertical is not None and seen.vanishing_points.weight[vertical] >= _WALLS
-        partly = self.attention is not None and self.attention.asked is not None
         if self._walled is None:
             self._walled = walls
         elif partly and not walls:

@@ -13,11 +13,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from robot_vision.geometry import Camera
-from robot_vision.perception.head_angles import HeadAngles, HeadHistory
+from robot_vision.perception.joint_history import JointHistory
 from robot_vision.ros.messages import MessageError, check_finite
 from robot_vision.ros.node import stamp_ns
 
 PAN, TILT = "camera_pan", "camera_tilt"
+#: The joints of a head, and the greatest angle of each, rad.
+_MOST = {PAN: math.pi, TILT: math.pi / 2}
 BASE = "base_link"
 #: A head that is turned by no more than this looks straight ahead, rad.
 STRAIGHT = 0.01
@@ -27,29 +29,32 @@ class Head:
     """Knows where the camera looks; as long as nobody speaks of its joints it is fixed to the body."""
 
     def __init__(self) -> None:
-        self._history = HeadHistory()
-        self._there = False
+        self._joints: dict[str, JointHistory] = {}
 
     def take(self, message: JointState) -> None:
-        """Take in `joint_states`; those of wheels and arms tell nothing of the head.
+        """Take in `joint_states`, of both joints or of one; those of wheels and arms tell nothing of the head.
+
+        A joint that was never heard of stands at zero.
 
         Raises:
             MessageError: the angle of a joint of the head is missing, not finite or none a head can have.
         """
-        if PAN not in message.name and TILT not in message.name:
-            return
-        self._there = True
+        names = list(message.name)
+        told = [joint for joint in _MOST if joint in names]
+        for joint in told:
+            self._joints.setdefault(joint, JointHistory())
         angles = {}
-        for joint in (PAN, TILT):
-            place = list(message.name).index(joint) if joint in message.name else None
-            if place is not None and place >= len(message.position):
+        for joint in told:
+            place = names.index(joint)
+            if place >= len(message.position):
                 raise MessageError(f"{joint} has no position")
-            angles[joint] = 0.0 if place is None else float(message.position[place])
+            angles[joint] = float(message.position[place])
         check_finite(angles)
-        for joint, most in ((PAN, math.pi), (TILT, math.pi / 2)):
-            if abs(angles[joint]) > most:
-                raise MessageError(f"{joint} is {angles[joint]:g} rad: angles are told in radians")
-        self._history.add(HeadAngles(1e-9 * stamp_ns(message.header.stamp), angles[PAN], angles[TILT]))
+        for joint, angle in angles.items():
+            if abs(angle) > _MOST[joint]:
+                raise MessageError(f"{joint} is {angle:g} rad: angles are told in radians")
+        for joint, angle in angles.items():
+            self._joints[joint].add(1e-9 * stamp_ns(message.header.stamp), angle)
 
     def turned(self, camera: Camera, stamp_s: float) -> Camera:
         """The camera as the head held it at the time of a picture.
@@ -57,18 +62,23 @@ class Head:
         Raises:
             MessageError: there is a head, and nobody says how it stood then.
         """
-        if not self._there:
+        if not self._joints:
             return camera
-        angles = self._history.at(stamp_s)
-        if angles is None:
-            newest = self._history.newest_s
-            age = (
-                "nothing usable has come" if newest is None else f"the newest is {stamp_s - newest:.2f} s old"
-            )
-            raise MessageError(
-                f"where the camera looked is not known: {age}; nothing is said of this picture"
-            )
-        return replace(camera, pan=angles.pan, tilt=angles.tilt)
+        angles = dict.fromkeys(_MOST, 0.0)
+        for joint, history in self._joints.items():
+            angle = history.at(stamp_s)
+            if angle is None:
+                newest = history.newest_s
+                age = (
+                    "nothing usable has come"
+                    if newest is None
+                    else f"the newest is {stamp_s - newest:.2f} s old"
+                )
+                raise MessageError(
+                    f"where the camera looked is not known: of {joint} {age}; nothing is said of this picture"
+                )
+            angles[joint] = angle
+        return replace(camera, pan=angles[PAN], tilt=angles[TILT])
 
     def check_straight(self, camera: Camera, stamp_s: float) -> None:
         """Look whether the head looked straight ahead at the time of a picture.
@@ -83,7 +93,8 @@ class Head:
 
     def clear(self) -> None:
         """Forget what was said before a clock jumped; that there is a head stays known."""
-        self._history.clear()
+        for history in self._joints.values():
+            history.clear()
 
 
 def point_to_message(header: Header, point: NDArray[Any]) -> PointStamped:

@@ -35,6 +35,14 @@ def shown(topic: str, type_name: str, message: Any) -> Shown:
 
 
 def _image(topic: str, message: Any) -> Shown:
+    if message.encoding == "32FC1":
+        order = ">f4" if message.is_bigendian else "<f4"
+        metres = np.frombuffer(bytes(message.data), order).reshape(message.height, message.step // 4)
+        metres = metres[:, : message.width].astype(np.float32)
+        # Of a distance function the first row lies below, as that of the map.
+        plan = topic.split("/")[-1] == "distance_field"
+        yield f"{'plan' if plan else 'camera'}/{topic}", rr.DepthImage(metres[::-1] if plan else metres)
+        return
     pixels = picture(message)
     model = "L" if pixels.ndim == 2 else "BGR"
     yield f"{_screen(topic)}/{topic}", rr.Image(pixels, color_model=model, draw_order=-1.0)

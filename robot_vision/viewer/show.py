@@ -32,6 +32,7 @@ def view(
     target: Target = Target.WINDOW,
     file: Path | None = None,
     progress: Callable[[int, int | None], None] | None = None,
+    complain: Callable[[str], None] | None = None,
 ) -> int:
     """Show a bag: pictures with lines and vanishing points, plans, and what changes over time as curves.
 
@@ -40,13 +41,15 @@ def view(
         target: window, browser or file.
         file: to write (.rrd) when the target is one.
         progress: called with the messages done and their number.
+        complain: called once for each topic of which a message could not be shown, with the first reason.
 
     Returns:
         The number of messages shown. With a browser the recording is served for as long as this process lives.
 
     Raises:
         BagError: the bag cannot be read.
-        ViewerError: the viewer is not installed, or nothing in the bag can be shown.
+        ViewerError: the viewer is not installed or cannot be opened, the file to write is the bag or cannot be
+            written, or nothing in the bag can be shown.
     """
     try:
         import rerun as rr
@@ -55,24 +58,41 @@ def view(
     from robot_vision.viewer.archetypes import KNOWN, shown
 
     reader = BagReader(bag)
+    if file is not None and file.exists() and file.samefile(reader.path):
+        raise ViewerError(f"{file} is the bag itself: write the recording elsewhere")
     topics = [name for name, info in reader.topics.items() if info.type_name in KNOWN]
     if not topics:
         raise ViewerError(f"nothing in {bag} can be shown: it holds {', '.join(reader.topics) or 'no topic'}")
     recording = rr.RecordingStream("robot_vision")
-    _open(rr, recording, target, file)
+    try:
+        _open(rr, recording, target, file)
+    except RuntimeError as cause:
+        raise ViewerError(f"the viewer cannot be opened: {str(cause).strip().splitlines()[0]}") from cause
     total = sum(reader.topics[name].count for name in topics)
+    done = 0
+    faults: dict[str, str] = {}
     for number, message in enumerate(reader.messages(topics)):
-        stamp = header_stamp_ns(message.cdr)
-        recording.set_time(TIMELINE, timestamp=1e-9 * stamp)
-        content = decode(message.cdr, message.type_name)
-        for path, archetype in shown(message.topic.strip("/"), message.type_name, content):
-            recording.log(path, archetype)
+        try:
+            content = decode(message.cdr, message.type_name)
+            drawn = list(shown(message.topic.strip("/"), message.type_name, content))
+        except ValueError as cause:  # one message that is none must not hide all others
+            faults.setdefault(message.topic, str(cause))
+        else:
+            recording.set_time(TIMELINE, timestamp=1e-9 * header_stamp_ns(message.cdr))
+            for path, archetype in drawn:
+                recording.log(path, archetype)
+            done += 1
         if progress is not None:
             progress(number + 1, total)
+    if not done and faults:
+        raise ViewerError(f"nothing in {bag} can be shown: {next(iter(faults.values()))}")
     recording.flush()
     if target is Target.FILE:
         recording.disconnect()
-    return total
+    if complain is not None:
+        for topic, fault in faults.items():
+            complain(f"{topic}: not all of it is shown: {fault}")
+    return done
 
 
 def _open(rr: Any, recording: Any, target: Target, file: Path | None) -> None:

@@ -113,7 +113,9 @@ def test_joints_that_are_no_angles_or_too_old_are_told_and_no_heading_is_said(be
 class Loop:
     """Simulator, line detector and estimator in lockstep; the test steers."""
 
-    def __init__(self, graph: Graph, pictures: int, **parameters: Any) -> None:
+    def __init__(
+        self, graph: Graph, pictures: int, eyes: dict[str, Any] | None = None, **parameters: Any
+    ) -> None:
         camera = standard_camera()
         environment = {"ROS_DOMAIN_ID": str(graph.domain)}
         self.graph = graph
@@ -123,7 +125,7 @@ class Loop:
         self.truth = graph.hear("truth/heading", PoseWithCovarianceStamped)
         self.looks = graph.hear("look_at", PointStamped)
         self.hand = graph.node.create_publisher(TwistStamped, "steering", QoSProfile(depth=10))
-        eyes = {"camera.height": camera.height_m, "camera.pitch": camera.pitch, "use_sim_time": True}
+        place = {"camera.height": camera.height_m, "camera.pitch": camera.pitch}
         simulated = {
             "settings": ["length=20"],
             "rate": RATE,
@@ -141,7 +143,7 @@ class Loop:
             NodeProcess(node, own, environment=environment)
             for node, own in (
                 ("line_detector", {"transport": "compressed", "use_sim_time": True}),
-                ("vp_estimator", eyes),
+                ("vp_estimator", {"use_sim_time": True, **(place if eyes is None else eyes)}),
                 ("simulator", simulated),
             )
         ]
@@ -195,6 +197,23 @@ def test_in_the_loop_the_head_looks_where_the_robot_turns_to_and_the_heading_sta
     assert len(errors) >= pictures - 4
     assert math.degrees(np.abs(errors).max()) < 0.6
     assert set(heard(loop.looks, PointStamped)) >= set(stamps[:-1])
+
+
+def test_an_estimator_that_cannot_say_where_to_look_does_not_hold_up_the_drive() -> None:
+    """Without the height of the camera it advertises look_at and says none."""
+    pictures = 6
+    with new_graph() as graph:
+        loop = Loop(graph, pictures, {}, lockstep_timeout=1.5)
+        try:
+            for picture in range(pictures):
+                loop.steer(picture, 0.4, 0.0)
+            graph.until(lambda: not loop.processes[-1].running, "the end of the drive")
+            log = "\n".join(loop.processes[-1].log)
+        finally:
+            loop.close()
+    assert "/look_at: none to the picture at 0.00 s" in log
+    assert log.count("/look_at: none") == 1
+    assert '"without_steering": 0' in log
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,7 @@ def test_a_gap_in_time_another_camera_and_a_clock_set_back_are_surprises() -> No
     robot = Robot()
     robot.settled()
     robot.picture += RATE
-    assert robot.look().attention is None or robot.attention.reason == ""
+    assert robot.look().attention is None
     robot = Robot()
     answer = robot.settled()
     lines = LineSegments.from_endpoints(
@@ -163,6 +163,45 @@ def test_a_gap_in_time_another_camera_and_a_clock_set_back_are_surprises() -> No
         robot.settled()
         assert robot.attention.update(lines, points, answer.attitude, stamp) is None
         assert robot.attention.reason in {"pictures are far apart", "another camera", "another way ahead"}
+
+
+@pytest.mark.parametrize("late", [1, 2])
+def test_a_word_that_comes_late_does_not_pass_a_part_off_as_the_whole(late: int) -> None:
+    """Where each region is searched `late` pictures after the one it was asked for, it stays as large."""
+
+    def shares(late: int) -> list[float]:
+        robot = Robot()
+        asked: list[Region | None] = [None] * (late + 1)
+        for picture in range(120):
+            lines = seen_in(seen_lines(HALL, 0.2, 0.05, robot.random), asked[-1 - late])
+            asked.append(robot.way.update(lines, CAMERA, picture / RATE, turn_rate=0.0).attention)
+        return [region.share(CAMERA.width, CAMERA.height) for region in asked if region is not None]
+
+    usual, lagging = shares(0), shares(late)
+    assert len(lagging) > 80
+    assert min(lagging) > 0.9 * min(usual)
+
+
+@pytest.mark.parametrize(("swing", "reason"), [(0.002, ""), (0.2, "the head turns")])
+def test_a_head_may_tremble_and_is_looked_after_when_it_turns(swing: float, reason: str) -> None:
+    robot = Robot()
+    for picture in range(12):
+        camera = replace(CAMERA, pan=0.1 + swing * (-1) ** picture)
+        lines = seen_in(seen_lines(HALL, 0.2, 0.05, robot.random, camera), robot.attention.asked)
+        answer = robot.way.update(lines, camera, picture / RATE, turn_rate=0.0)
+        assert answer.lane is not None
+        if picture > 1:
+            assert robot.attention.reason == reason
+
+
+def test_a_camera_upside_down_is_given_no_region() -> None:
+    """The floor, and what tells, is above then."""
+    robot, camera = Robot(), replace(CAMERA, roll=math.pi)
+    for picture in range(4):
+        lines = seen_lines(HALL, 0.2, 0.05, robot.random, camera)
+        answer = robot.way.update(lines, camera, picture / RATE, turn_rate=0.0)
+        assert answer.vanishing_points.of(Role.PRIMARY) is not None
+        assert answer.attention is None
 
 
 def test_the_kind_of_way_is_not_judged_by_a_part_of_a_picture() -> None:

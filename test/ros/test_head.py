@@ -47,9 +47,41 @@ def test_between_two_words_the_angle_goes_by_proportion_and_a_little_beyond() ->
     assert head((1.0, 0.3, 0.0)).turned(CAMERA, 1.08).pan == pytest.approx(0.3)
 
 
+def test_joints_that_speak_each_for_itself_are_both_heard() -> None:
+    """As two servo drivers do, each on its own message, at its own time and a little out of order."""
+    apart = Head()
+    for stamp_s, name, angle in (
+        (1.00, "camera_pan", 0.4),
+        (0.99, "camera_tilt", -0.1),
+        (1.05, "camera_pan", 0.4),
+        (1.04, "camera_tilt", -0.1),
+        (1.02, "camera_pan", 0.4),
+    ):
+        apart.take(joints(stamp_s, [name], [angle]))
+        apart.take(joints(stamp_s, ["wheel"], [9.0]))
+    turned = apart.turned(CAMERA, 1.05)
+    assert (turned.pan, turned.tilt) == pytest.approx((0.4, -0.1))
+    apart.take(joints(1.3, ["camera_pan"], [0.4]))
+    with pytest.raises(MessageError, match="of camera_tilt the newest is 0.26 s old"):
+        apart.turned(CAMERA, 1.3)
+
+
+def test_a_word_said_twice_and_one_that_comes_late_take_nothing_away() -> None:
+    turning = head((1.0, 0.1, 0.0), (1.1, 0.3, 0.0), (1.1, 0.3, 0.0), (1.05, 0.2, 0.0))
+    assert turning.turned(CAMERA, 1.025).pan == pytest.approx(0.15)
+    assert turning.turned(CAMERA, 1.09).pan == pytest.approx(0.28)
+
+
+def test_a_stamp_that_goes_far_back_forgets_what_was_said_before() -> None:
+    turning = head((5.0, 0.1, 0.0), (5.05, 0.2, 0.0), (1.0, 0.5, 0.0))
+    assert turning.turned(CAMERA, 1.0).pan == pytest.approx(0.5)
+    with pytest.raises(MessageError, match="is 4.00 s old"):
+        turning.turned(CAMERA, 5.0)
+
+
 def test_words_that_are_too_old_say_nothing() -> None:
     told = head((1.0, 0.1, 0.0))
-    with pytest.raises(MessageError, match="is 0.50 s old"):
+    with pytest.raises(MessageError, match="camera_pan the newest is 0.50 s old"):
         told.turned(CAMERA, 1.5)
     told.clear()
     with pytest.raises(MessageError, match="nothing usable"):
