@@ -86,7 +86,7 @@ def _table(whole: dict[str, Tally], parts: dict[str, dict[str, Tally]], count: i
         rows.append(shares(f"ids kept, {name}", tallies, "kept", "found"))
     rows.append(Row("CPU a picture", "ms", [Cell(1e3 * float(np.mean(whole[c].seconds))) for c in SETS]))
     return Table(
-        f"Spraying: {count} drives of {SECONDS:g} s for each crop, 640x480 at 10 Hz, 1.6 m/s, the node's library without the node",
+        f"Spraying: {count} drives of {SECONDS:g} s for each crop, 640x480 at 10 Hz, 1.6 m/s, without the node",
         list(SETS),
         rows,
         [
