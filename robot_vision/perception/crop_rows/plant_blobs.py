@@ -161,7 +161,7 @@ class PlantSegmenter:
         grown = (window.cells > 0).astype(np.uint8)
         reach = max(int(0.5 * self.join / self.side + 0.5), 1)
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-        joined = cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel)
+        joined = np.asarray(cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel), np.uint8)
         count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
         labels = np.asarray(components, np.int32)
         row, column = np.nonzero(grown)

@@ -73,7 +73,7 @@ def cut_beside(
     beside = np.zeros_like(grown)
     beside[row, column] = 1
     parts, of = cv2.connectedComponents(beside, connectivity=8, ltype=cv2.CV_32S)
-    part = np.asarray(of)[row, column]
+    part = np.asarray(of, np.intp)[row, column]
     farthest = np.zeros(parts)
     np.maximum.at(farthest, part, away)
     amount = np.bincount(part, minlength=parts)
