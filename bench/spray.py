@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
@@ -28,25 +31,34 @@ WITHOUT: dict[str, Callable[[], PlantMap]] = {
 
 def run(quick: bool) -> list[Table]:
     """Measure three drives of each crop, one when it is to be quick."""
+    began = time.monotonic()
     seeds = QUICK_SEEDS if quick else SEEDS
-    whole: dict[str, Tally] = {}
-    parts: dict[str, dict[str, Tally]] = {name: {} for name in WITHOUT}
-    for crop in SETS:
-        drives = [outing({"set": crop}, seed, SECONDS) for seed in seeds]
-        whole[crop] = _driven(drives, PlantMap)
-        for name, make in WITHOUT.items():
-            parts[name][crop] = _driven(drives, make)
-    return [_table(whole, parts, len(seeds))]
+    whole = {crop: Tally() for crop in SETS}
+    parts = {name: {crop: Tally() for crop in SETS} for name in WITHOUT}
+    drives = [(crop, seed) for crop in SETS for seed in seeds]
+    with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+        for (crop, _), (own, without) in zip(
+            drives, pool.map(_driven, *zip(*drives, strict=True)), strict=True
+        ):
+            whole[crop].add(own)
+            for name, tally in without.items():
+                parts[name][crop].add(tally)
+    return [_table(whole, parts, len(seeds), time.monotonic() - began)]
 
 
-def _driven(drives: list[Outing], make: Callable[[], PlantMap]) -> Tally:
+def _driven(crop: str, seed: int) -> tuple[Tally, dict[str, Tally]]:
+    """One drive, with all cues and without each."""
+    drive = outing({"set": crop}, seed, SECONDS)
+    return _tended(drive, PlantMap), {name: _tended(drive, make) for name, make in WITHOUT.items()}
+
+
+def _tended(drive: Outing, make: Callable[[], PlantMap]) -> Tally:
     tally = Tally()
-    for drive in drives:
-        tend(drive, make(), SprayPlanner(), tally)
+    tend(drive, make(), SprayPlanner(), tally)
     return tally
 
 
-def _table(whole: dict[str, Tally], parts: dict[str, dict[str, Tally]], count: int) -> Table:
+def _table(whole: dict[str, Tally], parts: dict[str, dict[str, Tally]], count: int, took: float) -> Table:
     def shares(name: str, tallies: dict[str, Tally], part: str, of: str, mark: Mark | None = None) -> Row:
         return Row(name, "%", [Cell(tallies[crop].share(part, of), mark) for crop in SETS])
 
@@ -74,13 +86,14 @@ def _table(whole: dict[str, Tally], parts: dict[str, dict[str, Tally]], count: i
         rows.append(shares(f"ids kept, {name}", tallies, "kept", "found"))
     rows.append(Row("CPU a picture", "ms", [Cell(1e3 * float(np.mean(whole[c].seconds))) for c in SETS]))
     return Table(
-        f"Spraying: {count} drives of {SECONDS:g} s for each crop, 640x480 at 10 Hz, 1.6 m/s, in one process",
+        f"Spraying: {count} drives of {SECONDS:g} s for each crop, 640x480 at 10 Hz, 1.6 m/s, without the node",
         list(SETS),
         rows,
         [
             "20 % of the plants missing, as many weeds as plants were sown, up to 2 deg of roll and pitch",
             "24 nozzles of 40 mm behind the robot, latency 0.1 s, 20 mm kept from the crop",
             "clear: a nozzle could reach it and keep that distance, had it been told the truth",
+            f"the whole run took {took:.0f} s",
             "hit: a jet reaches the circle as large as the plant's leaves",
         ],
     )

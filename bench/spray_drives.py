@@ -84,6 +84,14 @@ class Tally:
     surprises: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
 
+    def add(self, other: Tally) -> None:
+        """Take in what another drive counted."""
+        for name, count in other.counts.items():
+            self.counts[name] += count
+        self.errors += other.errors
+        self.surprises += other.surprises
+        self.seconds += other.seconds
+
     def share(self, part: str, whole: str) -> float:
         """A count as a share of another, %."""
         return 100.0 * self.counts[part] / self.counts[whole] if self.counts[whole] else float("nan")

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
 from robot_vision.mapping.plant_kinds import PlantJudge, in_rows
-from robot_vision.mapping.plant_matching import blob_noise, matched, shift_noise
+from robot_vision.mapping.plant_matching import blob_noise, look_for, matched, shift_noise
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, common_shift
-from robot_vision.mapping.plant_tracks import PlantTracks, Stature
+from robot_vision.mapping.plant_tracks import KNOWN_AGE, PlantTracks, Stature
 from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
 from robot_vision.perception.crop_rows.plant_blobs import (
@@ -36,12 +36,6 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-#: A plant is known once so many pictures have shown it.
-KNOWN_AGE = 3
-#: Plants that so many pictures in a row have not shown are forgotten, young ones after fewer.
-_MOST_MISSED, _MOST_MISSED_YOUNG, _MOST_HIDDEN = 5, 2, 12
-#: Share of the ground about a plant's place below which it is bare.
-_BARE = 0.15
 #: Standard deviation of roll and pitch where no rows tell them, rad.
 _UNSEEN_LEAN = 0.02
 #: Share of a picture's word on how large plants are.
@@ -236,9 +230,10 @@ class PlantMap:
         tracks.see_areas(mine, blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2)
         alone = np.ones(len(tracks), bool)
         alone[mine] = False
-        self._look_for(alone, expected, window, camera)
+        places = expected * (window.fall / height) + (camera.x_m, 0.0)
+        look_for(tracks, alone, places, window)
         self._begin(blobs, theirs, seen, noise, camera)
-        self._forget()
+        tracks.forget(self.pose, self.behind)
 
     def _shift(self, blobs: Blobs, camera: Camera) -> Shift:
         """What all plants share; by it the pose is corrected."""
@@ -275,23 +270,6 @@ class PlantMap:
         )
         return found
 
-    def _look_for(self, alone: Mask, expected: Array, window: GroundWindow, camera: Camera) -> None:
-        """Note of plants without a blob whether their ground is bare, or hidden by other leaves."""
-        assert camera.height_m is not None
-        tracks = self.tracks
-        places = expected * (window.fall / camera.height_m) + (camera.x_m, 0.0)
-        index, inside = window.at(places)
-        looked = np.flatnonzero(alone & inside)
-        if not len(looked):
-            return
-        reach = np.arange(-1, 2) * max(int(0.006 / window.side), 1)
-        shape = window.cells.shape
-        rows = np.clip(index[looked, 0, None, None] + reach[None, :, None], 0, shape[0] - 1)
-        columns = np.clip(index[looked, 1, None, None] + reach[None, None, :], 0, shape[1] - 1)
-        bare = (window.cells[rows, columns] > 0).mean(axis=(1, 2)) < _BARE
-        tracks.missed[looked[bare]] += 1
-        tracks.hidden[looked[~bare]] += 1
-
     def _begin(self, blobs: Blobs, taken: Rows, seen: Array, noise: Array, camera: Camera) -> None:
         """Begin with blobs that are no known plant."""
         assert camera.height_m is not None
@@ -315,11 +293,3 @@ class PlantMap:
                 Stature(self.radius, self._tall),
             )
             self._next += count
-
-    def _forget(self) -> None:
-        tracks = self.tracks
-        most = np.where(tracks.ages < KNOWN_AGE, _MOST_MISSED_YOUNG, _MOST_MISSED)
-        cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
-        longest = np.where(tracks.ages < KNOWN_AGE, _MOST_MISSED_YOUNG, _MOST_HIDDEN)
-        ahead = (tracks.states[:, :2] - (self.pose.x, self.pose.y)) @ (cosine, sine)
-        tracks.keep((tracks.missed < most) & (tracks.hidden < longest) & (ahead > -self.behind))

@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift
 from robot_vision.mapping.plant_tracks import PlantTracks
-from robot_vision.perception.crop_rows.plant_blobs import Blobs
+from robot_vision.perception.crop_rows.plant_blobs import Blobs, GroundWindow
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -18,6 +18,8 @@ Rows = NDArray[np.intp]
 _AREA_SIGMA = 0.6
 #: How far from all that is seen a plant may be expected and yet be among it, m.
 _BEYOND = 0.3
+#: Share of the ground about a plant's place below which it is bare.
+_BARE = 0.15
 #: Cost of what must not be matched.
 _NEVER = 1e6
 
@@ -81,3 +83,25 @@ def shift_noise(blobs: Blobs, shift: Shift, height: float, camera_x: float) -> A
     jacobian[:, 0, ROLL], jacobian[:, 1, ROLL] = height * a * b, height * (1.0 + b * b)
     jacobian[:, 0, PITCH], jacobian[:, 1, PITCH] = -height * (1.0 + a * a), -height * a * b
     return np.asarray(jacobian @ shift.covariance @ jacobian.transpose(0, 2, 1))
+
+
+def look_for(tracks: PlantTracks, alone: NDArray[np.bool_], places: Array, window: GroundWindow) -> None:
+    """Note of plants without a blob whether their ground is bare, or hidden by other leaves.
+
+    Args:
+        tracks: (N,) plants that are known.
+        alone: (N,) which of them have no blob.
+        places: (N, 2) where they should appear in the window's plane, ahead and left of base_link, m.
+        window: the ground.
+    """
+    index, inside = window.at(places)
+    looked = np.flatnonzero(alone & inside)
+    if not len(looked):
+        return
+    reach = np.arange(-1, 2) * max(int(0.006 / window.side), 1)
+    shape = window.cells.shape
+    rows = np.clip(index[looked, 0, None, None] + reach[None, :, None], 0, shape[0] - 1)
+    columns = np.clip(index[looked, 1, None, None] + reach[None, None, :], 0, shape[1] - 1)
+    bare = (window.cells[rows, columns] > 0).mean(axis=(1, 2)) < _BARE
+    tracks.missed[looked[bare]] += 1
+    tracks.hidden[looked[~bare]] += 1

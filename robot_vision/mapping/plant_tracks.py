@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 _TALL, _TALL_SIGMA, _CROP_SIGMA, _ALIKE = 0.6, 0.35, 0.15, 0.5
 #: Least standard deviation of the logarithm of q.
 _LEAST_SIGMA = 0.004
+#: A plant is known once so many pictures have shown it.
+KNOWN_AGE = 3
+#: Plants that so many pictures in a row have not shown are forgotten, young ones after fewer.
+_MOST_MISSED, _MOST_MISSED_YOUNG, _MOST_HIDDEN = 5, 2, 12
 #: How fast the area that is told forgets: as if it were the mean of so many pictures.
 _MEMORY = 8.0
 
@@ -88,6 +92,14 @@ class PlantTracks:
         """Forget the others."""
         for name in self.__dataclass_fields__:
             setattr(self, name, getattr(self, name)[which])
+
+    def forget(self, pose: Pose, behind: float) -> None:
+        """Forget plants that were missed too often, and those farther behind the robot than so many metres."""
+        young = self.ages < KNOWN_AGE
+        most = np.where(young, _MOST_MISSED_YOUNG, _MOST_MISSED)
+        longest = np.where(young, _MOST_MISSED_YOUNG, _MOST_HIDDEN)
+        ahead = (self.states[:, :2] - (pose.x, pose.y)) @ (np.cos(pose.yaw), np.sin(pose.yaw))
+        self.keep((self.missed < most) & (self.hidden < longest) & (ahead > -behind))
 
     def seen_from(self, pose: Pose, camera_x: float) -> tuple[Array, Array]:
         """Where the middles of plants appear on the ground from a camera, (N, 2) ahead and left of it, m.

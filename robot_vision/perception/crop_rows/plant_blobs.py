@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.geometry.rotation import rotation_from_rpy
 from robot_vision.perception.crop_rows.ground_fit import lateral
+from robot_vision.perception.crop_rows.plant_bodies import bodies, cut_beside
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,20 +25,16 @@ Mask = NDArray[np.bool_]
 _BORDER = 6
 #: Marks of a cell of the window: something grows there; likewise, at the border of the picture.
 _GROWS, _CUT = 1, 3
-#: Blur with which bodies of plants stand out, and distance between them, in radii of a usual plant.
-_BODY, _APART = 0.3, 0.9
-#: The same from plants that are known already.
+#: Distance of bodies from plants that are known already, in radii of a usual plant.
 _NEW = 1.3
-#: Height of a body in the blurred picture, 1 being grown over all around.
-_LEAST_BODY = 0.3
-#: Radius of a usual plant in the cells in which bodies are sought.
-_COARSE = 6.0
 #: Ground that tells how wide rows are (m ahead of the nearest), in so many bins; fewest cells and rounds of the fit.
 _NEAR_M, _BINS, _FEWEST_CELLS, _ROUNDS = 1.2, 60, 100, 20
 #: Standard deviation of a plant about the line of its row, m.
 _SOWN = 0.014
 #: Blobs larger than so many usual plants are cut.
 _TOO_LARGE = 2.2
+#: Share of the ground grown over from which on the crop closes: what stands out then is mostly its own leaves.
+_CLOSES = 0.45
 
 
 @dataclass(frozen=True)
@@ -164,12 +161,16 @@ class PlantSegmenter:
         grown = (window.cells > 0).astype(np.uint8)
         reach = max(int(0.5 * self.join / self.side + 0.5), 1)
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-        joined = cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel)
+        joined = np.asarray(cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel), np.uint8)
         count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
         labels = np.asarray(components, np.int32)
         row, column = np.nonzero(grown)
         label = labels[row, column].astype(np.intp)
         if radius is not None:
+            if len(row) < _CLOSES * np.count_nonzero(window.seen):
+                most = _TOO_LARGE * np.pi * (radius / self.side) ** 2
+                count = cut_beside(joined, labels, count, radius / self.side, self.side, most)
+                label = labels[row, column].astype(np.intp)
             count, label = self._separated(window, labels, row, column, label, count, radius, known)
         amount = np.bincount(label, minlength=count).astype(np.float64)
         cut = np.bincount(label, window.cells[row, column] == _CUT, count) > 0.0
@@ -207,7 +208,7 @@ class PlantSegmenter:
         large[0] = False
         if not large.any():
             return count, label
-        tops = _tops(window, radius / self.side)
+        tops = bodies(window.cells, radius / self.side)
         index, inside = window.at(known)
         seeds = index[inside]
         if len(seeds):
@@ -269,19 +270,6 @@ def row_radius(window: GroundWindow, rows: Array, spacing: float) -> float | Non
         mean = float((own * share) @ middle / (own @ share))
         sigma = float(np.sqrt((own * share) @ (middle - mean) ** 2 / (own @ share)) + 1e-4)
     return 2.0 * float(np.sqrt(max(sigma**2 - _SOWN**2, _SOWN**2 / 4.0)))
-
-
-def _tops(window: GroundWindow, radius: float) -> NDArray[np.intp]:
-    """Cells (M, 2) about which more grows than about their neighbours, for plants of a radius in cells."""
-    step = max(int(radius / _COARSE), 1)
-    height, width = (side // step * step for side in window.cells.shape)
-    grown = (window.cells[:height, :width] > 0).astype(np.float32)
-    share = grown.reshape(height // step, step, width // step, step).mean(axis=(1, 3))
-    body = cv2.GaussianBlur(share, (0, 0), _BODY * radius / step)
-    reach = max(int(_APART * radius / step), 1)
-    around = cv2.dilate(body, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
-    tops = np.argwhere((body >= around) & (body > _LEAST_BODY))
-    return np.asarray(tops * step + step // 2, np.intp)
 
 
 def nearest_ground(camera: Camera, lean: Lean) -> float:

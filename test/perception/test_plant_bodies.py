@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A weed that touches a plant of the crop is cut off it; lobes of the crop's own leaves are not."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from robot_vision.perception.crop_rows.plant_bodies import cut_beside
+
+RADIUS, SIDE = 25.0, 0.006
+Array = NDArray[np.generic]
+
+
+def _cut(*discs: tuple[int, int, int], most: float = 5000.0) -> tuple[int, Array, Array]:
+    grown = np.zeros((160, 160), np.uint8)
+    for x, y, radius in discs:
+        cv2.circle(grown, (x, y), radius, 1, -1)
+    count, components = cv2.connectedComponents(grown, connectivity=8, ltype=cv2.CV_32S)
+    labels = np.asarray(components, np.int32)
+    return cut_beside(grown, labels, count, RADIUS, SIDE, most), labels, grown
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, 2.0, 4.0])
+def test_a_weed_at_the_edge_gets_its_own_label(angle: float) -> None:
+    x, y = 70 + round(29 * np.cos(angle)), 70 + round(29 * np.sin(angle))
+    count, labels, grown = _cut((70, 70, 25), (x, y, 5))
+    assert count == 3
+    assert labels[70, 70] == 1
+    assert labels[y, x] == 2
+    assert ((labels > 0) == (grown > 0)).all()
+    assert 35 < np.count_nonzero(labels == 2) < 85
+
+
+def test_a_lobe_stays_with_its_plant() -> None:
+    count, labels, _ = _cut((70, 70, 25), (91, 70, 6))
+    assert count == 2
+    assert labels.max() == 1
+
+
+def test_weeds_alone_stay_whole() -> None:
+    count, labels, _ = _cut((40, 40, 5), (46, 40, 5), (100, 100, 6))
+    assert count == 3
+    assert labels[40, 40] == labels[40, 46] == 1
+
+
+def test_several_plants_grown_together_are_left_alone() -> None:
+    assert _cut((70, 70, 25), (99, 70, 5), most=1500.0)[0] == 2
