@@ -37,7 +37,8 @@ class Attention:
     Args:
         budget: cost of a look at the region, as a share of one at the whole picture.
         every: pictures from one look at the whole picture to the next at the latest.
-        least_support: share of what the last whole look promised that vanishing points must keep.
+        least_support: share of what the last whole look promised that vanishing points must keep; one picture that
+            tells less is let pass, a second is a surprise.
         least_lines: share of the lines promised that must be found.
         jump: change of roll or pitch between two pictures that is a surprise, rad.
         margin: kept free around what the region is laid out for, rad.
@@ -64,6 +65,7 @@ class Attention:
     _leans: tuple[float, float] | None = field(default=None, init=False, repr=False, compare=False)
     _camera: Camera | None = field(default=None, init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
+    _weak: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("budget", "least_support", "least_lines"):
@@ -103,7 +105,8 @@ class Attention:
         """
         step = np.inf if self._stamp is None else stamp_s - self._stamp
         self._stamp = stamp_s
-        before, self._leans = self._leans, None if attitude is None else (attitude.roll, attitude.pitch)
+        seen = attitude is not None and attitude.seen
+        before, self._leans = self._leans, (attitude.roll, attitude.pitch) if attitude and seen else None
         self.reason = self._surprise(lines, points, before, step)
         self._camera = points.camera
         primary = points.of(Role.PRIMARY)
@@ -113,7 +116,7 @@ class Attention:
         up = points.camera.optical_to_base[2] if attitude is None else attitude.up
         if self._layout is None:
             self._layout = lay_out(lines, points, primary, up, self.budget)
-            self._pictures = 0
+            self._pictures, self._weak = 0, False
             self._lead = int(points.ids[primary])
             if self._layout is None:
                 self.reason = "no part of the picture holds enough of what leads ahead"
@@ -158,11 +161,16 @@ class Attention:
             return "another way ahead"
         if len(lines) < self.least_lines * self._layout.lines:
             return "few lines"
+        weak_before, self._weak = self._weak, self._is_weak(points, primary, self._layout)
+        return "little support" if self._weak and weak_before else ""
+
+    def _is_weak(self, points: VanishingPoints, primary: int, layout: Layout) -> bool:
+        """Whether vanishing points keep too little of the support that the layout promised."""
         upright = points.of(Role.VERTICAL)
-        led, stood = self._layout.support
+        led, stood = layout.support
+        if points.weight[primary] < self.least_support * led:
+            return True
         # Uprights come and go as they are passed; what leads ahead does not.
-        if points.weight[primary] < self.least_support * led or (
-            stood > 0.0 and (upright is None or points.weight[upright] < 0.5 * self.least_support * stood)
-        ):
-            return "little support"
-        return ""
+        return stood > 0.0 and (
+            upright is None or bool(points.weight[upright] < 0.5 * self.least_support * stood)
+        )
