@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 _UNKNOWN_TURN, _NOD = 0.15, 0.15
 #: Pictures farther apart in time than this start afresh, s; between nearer ones things move a while besides, s.
 _LONGEST_STEP = 0.5
+#: Whoever searches may hear late where: a picture shows that it was searched everywhere by a line so far outside the
+#: region asked for last, as a share of the picture's width; or it is the last of so many asked for.
+_OUTSIDE, _SURELY = 0.03, 3
 
 
 @dataclass
@@ -52,7 +55,7 @@ class Attention:
     """
 
     budget: float = 0.45
-    every: int = 15
+    every: int = 25
     least_support: float = 0.5
     least_lines: float = 0.4
     jump: float = float(np.deg2rad(2.0))
@@ -66,6 +69,8 @@ class Attention:
     _camera: Camera | None = field(default=None, init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
     _weak: bool = field(default=False, init=False, repr=False, compare=False)
+    _last: Region | None = field(default=None, init=False, repr=False, compare=False)
+    _everywhere: int = field(default=0, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("budget", "least_support", "least_lines"):
@@ -81,7 +86,7 @@ class Attention:
     def reset(self) -> None:
         """Forget what earlier pictures told: look everywhere next."""
         self.asked, self.reason = None, "start"
-        self._layout = self._stamp = self._leans = None
+        self._layout = self._stamp = self._leans = self._last = None
 
     def update(
         self,
@@ -110,11 +115,18 @@ class Attention:
         self.reason = self._surprise(lines, points, before, step)
         self._camera = points.camera
         primary = points.of(Role.PRIMARY)
+        if self.asked is not None:
+            self._last, self._everywhere = self.asked, 0
+        else:
+            self._everywhere += 1
         if self.reason or primary is None:
             self.asked = self._layout = None
             return None
         up = points.camera.optical_to_base[2] if attitude is None else attitude.up
         if self._layout is None:
+            if not self._was_whole(lines, points.camera):
+                self.reason = "the picture was not searched everywhere yet"
+                return None
             self._layout = lay_out(lines, points, primary, up, self.budget)
             self._pictures, self._weak = 0, False
             self._lead = int(points.ids[primary])
@@ -163,6 +175,16 @@ class Attention:
             return "few lines"
         weak_before, self._weak = self._weak, self._is_weak(points, primary, self._layout)
         return "little support" if self._weak and weak_before else ""
+
+    def _was_whole(self, lines: LineSegments, camera: Camera) -> bool:
+        """Whether the picture, for which everywhere was asked, was searched everywhere."""
+        last = self._last
+        if last is None or self._everywhere >= _SURELY:
+            return True
+        away = _OUTSIDE * camera.width
+        u, v = lines.endpoints[:, ::2], lines.endpoints[:, 1::2]
+        beside = (u < last.left - away) | (u > last.right + away)
+        return bool(np.any(beside | (v < last.top - away) | (v > last.bottom + away)))
 
     def _is_weak(self, points: VanishingPoints, primary: int, layout: Layout) -> bool:
         """Whether vanishing points keep too little of the support that the layout promised."""

@@ -17,7 +17,7 @@ from robot_vision.perception.vanishing import Role, VanishingPoints
 Array = NDArray[np.float64]
 
 #: How far above the vanishing line a region may reach, rad.
-_TOPS = np.radians([0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.0, 15.0])
+_TOPS = np.radians([0.0, 1.0, 2.0, 4.0, 6.0, 9.0, 12.0])
 #: Room above that a region will be given besides, about, rad; beside it gets a column.
 _ROOM = 0.02
 #: The vanishing point has so much of the region on each side of it, rad.
@@ -33,7 +33,7 @@ _THRIFT = 0.02
 #: lines there. Measured on simulated roads and corridors and on the first half of a real road.
 _FIXED, _PIXELS, _LENGTH = 0.04, 0.78, 0.18
 #: A whole look that found fewer lines than this was followed by a second, fainter one; a region is spared one of both.
-_FEW, _SPARED = 120, 1.5
+_FEW, _SPARED = 120, 1.6
 #: Least share of what leads ahead on the floor that a region must hold.
 _LEAST = 0.3
 #: Least support of the primary vanishing point that a region must promise: fewer lines may confirm it no longer.
