@@ -37,13 +37,15 @@ _OUTSIDE, _SURELY = 0.03, 3
 class Attention:
     """Chooses, from what one picture showed, where lines are looked for in the next.
 
+    A part of a picture may be misread now and then: one picture with little support, or with an attitude that jumps,
+    is let pass, a second in a row is a surprise. All else that is odd is a surprise at once.
+
     Args:
         budget: cost of a look at the region, as a share of one at the whole picture.
         every: pictures from one look at the whole picture to the next at the latest.
-        least_support: share of what the last whole look promised that vanishing points must keep; one picture that
-            tells less is let pass, a second is a surprise.
+        least_support: share of what the last whole look promised that vanishing points must keep.
         least_lines: share of the lines promised that must be found.
-        jump: change of roll or pitch between two pictures that is a surprise, rad.
+        jump: change of roll or pitch between two pictures that is odd, rad.
         margin: kept free around what the region is laid out for, rad.
 
     Attributes:
@@ -54,7 +56,7 @@ class Attention:
         ValueError: for settings without meaning, naming the setting.
     """
 
-    budget: float = 0.45
+    budget: float = 0.44
     every: int = 25
     least_support: float = 0.5
     least_lines: float = 0.4
@@ -68,7 +70,7 @@ class Attention:
     _leans: tuple[float, float] | None = field(default=None, init=False, repr=False, compare=False)
     _camera: Camera | None = field(default=None, init=False, repr=False, compare=False)
     _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
-    _weak: bool = field(default=False, init=False, repr=False, compare=False)
+    _odd: bool = field(default=False, init=False, repr=False, compare=False)
     _last: Region | None = field(default=None, init=False, repr=False, compare=False)
     _everywhere: int = field(default=0, init=False, repr=False, compare=False)
 
@@ -110,9 +112,8 @@ class Attention:
         """
         step = np.inf if self._stamp is None else stamp_s - self._stamp
         self._stamp = stamp_s
-        seen = attitude is not None and attitude.seen
-        before, self._leans = self._leans, (attitude.roll, attitude.pitch) if attitude and seen else None
-        self.reason = self._surprise(lines, points, before, step)
+        lean = (attitude.roll, attitude.pitch) if attitude is not None and attitude.seen else None
+        self.reason = self._surprise(lines, points, lean, step)
         self._camera = points.camera
         primary = points.of(Role.PRIMARY)
         if self.asked is not None:
@@ -128,7 +129,7 @@ class Attention:
                 self.reason = "the picture was not searched everywhere yet"
                 return None
             self._layout = lay_out(lines, points, primary, up, self.budget)
-            self._pictures, self._weak = 0, False
+            self._pictures = 0
             self._lead = int(points.ids[primary])
             if self._layout is None:
                 self.reason = "no part of the picture holds enough of what leads ahead"
@@ -149,9 +150,13 @@ class Attention:
         return self.asked
 
     def _surprise(
-        self, lines: LineSegments, points: VanishingPoints, before: tuple[float, float] | None, step: float
+        self, lines: LineSegments, points: VanishingPoints, lean: tuple[float, float] | None, step: float
     ) -> str:
-        """Why the whole picture must be looked at; empty when nothing is odd."""
+        """Why the whole picture must be looked at; empty when nothing is odd, or for the first time."""
+        odd_before, self._odd = self._odd, False
+        before = self._leans
+        if lean is not None:
+            self._leans = lean
         primary = points.of(Role.PRIMARY)
         if primary is None or points.weight[primary] <= 0.0:
             return "no way ahead is seen"
@@ -160,9 +165,6 @@ class Attention:
         place = points.pixels[primary]
         if not (0.0 <= place[0] < points.camera.width and 0.0 <= place[1] < points.camera.height):
             return "the way ahead lies outside the picture"
-        if before is not None and self._leans is not None:
-            if max(abs(now - then) for now, then in zip(self._leans, before, strict=True)) > self.jump:
-                return "the attitude jumps"
         if self._layout is None:
             return ""
         if not 0.0 < step <= _LONGEST_STEP:
@@ -173,8 +175,13 @@ class Attention:
             return "another way ahead"
         if len(lines) < self.least_lines * self._layout.lines:
             return "few lines"
-        weak_before, self._weak = self._weak, self._is_weak(points, primary, self._layout)
-        return "little support" if self._weak and weak_before else ""
+        odd = ""
+        if self._is_weak(points, primary, self._layout):
+            odd = "little support"
+        elif lean is not None and before is not None and _apart(lean, before) > self.jump:
+            odd, self._leans = "the attitude jumps", before
+        self._odd = bool(odd)
+        return odd if odd_before else ""
 
     def _was_whole(self, lines: LineSegments, camera: Camera) -> bool:
         """Whether the picture, for which everywhere was asked, was searched everywhere."""
@@ -196,3 +203,7 @@ class Attention:
         return stood > 0.0 and (
             upright is None or bool(points.weight[upright] < 0.5 * self.least_support * stood)
         )
+
+
+def _apart(lean: tuple[float, float], other: tuple[float, float]) -> float:
+    return max(abs(lean[0] - other[0]), abs(lean[1] - other[1]))
