@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What looking where it matters saves of the cost of finding lines, and what it does to every score.
 
-Each set goes once through the objects that the nodes call, picture by picture everywhere and with attention side by side,
-so that whatever else the machine does meets both alike.
+Each set goes once through the objects that the nodes call, picture by picture everywhere and with attention in turn, so
+that whatever else the machine does meets both alike.
 """
 
 from __future__ import annotations
@@ -229,9 +229,7 @@ def _road() -> _Drive:
 
     def score(answers: Answers) -> Scores:
         paths = {stamp: answer.path for stamp, answer in answers.items()}
-        bends = [
-            curvature_at_start(path) - truth[stamp] for stamp, path in paths.items() if path is not None
-        ]
+        bends = [curvature_at_start(path) - truth[stamp] for stamp, path in paths.items() if path is not None]
         spread = float(np.ptp(list(truth.values())))
         return {
             **_headings(ROAD, answers),
