@@ -19,7 +19,7 @@ from robot_vision.bags import HeadingScore, decode, score_heading
 from robot_vision.bags.messages import stamp_ns
 from robot_vision.geometry.rotation import quaternion_to_rotation, rpy_from_rotation
 from robot_vision.ros.replays import replay
-from robot_vision.simulation.lane import LanePose, PolyLane
+from robot_vision.simulation.lane import PolyLane
 from robot_vision.simulation.road import RoadSettings, winding
 
 ROAD, SEED = ROOT / "bags" / "road.mcap", 1
@@ -57,26 +57,28 @@ def recorded(duration_s: float) -> Table:
 
 def curvatures(bag: Path) -> NDArray[np.float64]:
     """Curvature (1/m) of each `path_ahead` beside the robot, and the true one: (N, 2)."""
+    truth = true_curvatures(bag)
+    found = []
+    for cdr in said(bag, "path_ahead"):
+        message = decode(cdr, "nav_msgs/msg/Path")
+        points = np.array([(pose.pose.position.x, pose.pose.position.y) for pose in message.poses])
+        found.append((curvature_at_start(points), truth[stamp_ns(message)]))
+    return np.array(found)
+
+
+def true_curvatures(bag: Path) -> dict[int, float]:
+    """Curvature (1/m) of the road beside the robot, by stamp (ns)."""
     lane = PolyLane(winding(RoadSettings(), SEED), RoadSettings().width)
     truth = {}
     for cdr in said(bag, "truth/odom"):
         message = decode(cdr, "nav_msgs/msg/Odometry")
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         yaw = rpy_from_rotation(quaternion_to_rotation((turn.x, turn.y, turn.z, turn.w)))[2]
-        truth[stamp_ns(message)] = lane.locate(place.x, place.y, yaw)
-    found = []
-    for cdr in said(bag, "path_ahead"):
-        message = decode(cdr, "nav_msgs/msg/Path")
-        points = np.array([(pose.pose.position.x, pose.pose.position.y) for pose in message.poses])
-        found.append((_curvature_at_start(points), _bend_at(truth, stamp_ns(message))))
-    return np.array(found)
+        truth[stamp_ns(message)] = lane.locate(place.x, place.y, yaw).curvature
+    return truth
 
 
-def _bend_at(truth: dict[int, LanePose], stamp: int) -> float:
-    return truth[stamp].curvature
-
-
-def _curvature_at_start(points: NDArray[np.float64]) -> float:
+def curvature_at_start(points: NDArray[np.float64]) -> float:
     """Slope of the direction over the way at the first of points 0.5 m apart, by a parabola through the directions."""
     ways = np.diff(points, axis=0)
     lengths = np.hypot(ways[:, 0], ways[:, 1])

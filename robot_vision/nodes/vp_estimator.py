@@ -47,7 +47,7 @@ class VpEstimatorNode(VisionNode):
             "way", "auto", "auto: a corridor where walls are seen", choices=tuple(kind.value for kind in Kind)
         ),
         Setting("attention.enabled", False, "say on attention where lines are to be looked for next"),
-        Setting("attention.every", 15, "pictures from one look at the whole picture to the next", 1, 10_000),
+        Setting("attention.every", 25, "pictures from one look at the whole picture to the next", 1, 10_000),
         Setting("path_length", 10.0, "length of path_ahead, m; on a road at most 36", 1.0, 100.0),
         Setting("look_at.most_pan", 1.0, "how far to either side look_at may lead, rad", 0.05, 1.5),
         Setting("look_at.rate", 1.5, "how fast look_at may turn, rad/s", 0.05, 20.0),

@@ -37,12 +37,15 @@ _LATE, _RIM = 2, 0.02
 class Attention:
     """Chooses, from what one picture showed, where lines are looked for in the next.
 
+    A part of a picture may be misread now and then: one picture that shows little or no support of the way ahead, or an
+    attitude that jumps, is let pass, a second in a row is a surprise. All else that is odd is a surprise at once.
+
     Args:
         budget: cost of a look at the region, as a share of one at the whole picture.
         every: pictures from one look at the whole picture to the next at the latest.
         least_support: share of what the last whole look promised that vanishing points must keep.
         least_lines: share of the lines promised that must be found.
-        jump: change of roll or pitch, or of a head's pan or tilt, between two pictures that is a surprise, rad.
+        jump: change of roll or pitch between two pictures that is odd, of a head's pan or tilt that is a surprise, rad.
         margin: kept free around what the region is laid out for, rad.
 
     Attributes:
@@ -53,8 +56,8 @@ class Attention:
         ValueError: for settings without meaning, naming the setting.
     """
 
-    budget: float = 0.45
-    every: int = 15
+    budget: float = 0.44
+    every: int = 25
     least_support: float = 0.5
     least_lines: float = 0.4
     jump: float = float(np.deg2rad(2.0))
@@ -66,9 +69,10 @@ class Attention:
     _lead: int | None = field(default=None, init=False, repr=False, compare=False)
     _leans: tuple[float, float] | None = field(default=None, init=False, repr=False, compare=False)
     _camera: Camera | None = field(default=None, init=False, repr=False, compare=False)
+    _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
+    _odd: bool = field(default=False, init=False, repr=False, compare=False)
     _before: Region | None = field(default=None, init=False, repr=False, compare=False)
     _waited: int = field(default=0, init=False, repr=False, compare=False)
-    _stamp: float | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("budget", "least_support", "least_lines"):
@@ -85,6 +89,7 @@ class Attention:
         """Forget what earlier pictures told: look everywhere next."""
         self.asked, self.reason = None, "start"
         self._layout = self._stamp = self._leans = self._before = None
+        self._odd = False
 
     def searched_in_part(self, lines: LineSegments) -> bool:
         """Whether the lines of the picture that comes next, by all that is known, are those of a region alone."""
@@ -125,11 +130,11 @@ class Attention:
         """
         step = np.inf if self._stamp is None else stamp_s - self._stamp
         self._stamp = stamp_s
+        lean = (attitude.roll, attitude.pitch) if attitude is not None and attitude.seen else None
         late = self.asked is None and self.searched_in_part(lines)
         self._waited += 1
-        before, self._leans = self._leans, None if attitude is None else (attitude.roll, attitude.pitch)
         head = _head_moved(self._camera, points.camera)
-        self.reason = self._surprise(lines, points, before, step)
+        self.reason = self._surprise(lines, points, lean, step)
         if max(head) > self.jump:
             self.reason = "the head turns"
         self._camera = points.camera
@@ -164,20 +169,22 @@ class Attention:
         return region
 
     def _surprise(
-        self, lines: LineSegments, points: VanishingPoints, before: tuple[float, float] | None, step: float
+        self, lines: LineSegments, points: VanishingPoints, lean: tuple[float, float] | None, step: float
     ) -> str:
-        """Why the whole picture must be looked at; empty when nothing is odd."""
+        """Why the whole picture must be looked at; empty when nothing is odd, or for the first time."""
+        odd_before, self._odd = self._odd, False
+        before = self._leans
+        if lean is not None:
+            self._leans = lean
         primary = points.of(Role.PRIMARY)
-        if primary is None or points.weight[primary] <= 0.0:
+        lost = primary is not None and points.weight[primary] <= 0.0
+        if primary is None or lost and (self._layout is None or odd_before):
             return "no way ahead is seen"
         if not points.camera.focal_known:
             return "the focal length is not known"
         place = points.pixels[primary]
         if not (0.0 <= place[0] < points.camera.width and 0.0 <= place[1] < points.camera.height):
             return "the way ahead lies outside the picture"
-        if before is not None and self._leans is not None:
-            if max(abs(now - then) for now, then in zip(self._leans, before, strict=True)) > self.jump:
-                return "the attitude jumps"
         if self._layout is None:
             return ""
         if not 0.0 < step <= _LONGEST_STEP:
@@ -190,14 +197,30 @@ class Attention:
             return "another way ahead"
         if len(lines) < self.least_lines * self._layout.lines:
             return "few lines"
+        odd = ""
+        if lost:
+            odd = "no way ahead is seen"
+        elif self._is_weak(points, primary, self._layout):
+            odd = "little support"
+        elif lean is not None and before is not None and _apart(lean, before) > self.jump:
+            odd, self._leans = "the attitude jumps", before
+        self._odd = bool(odd)
+        return odd if odd_before else ""
+
+    def _is_weak(self, points: VanishingPoints, primary: int, layout: Layout) -> bool:
+        """Whether vanishing points keep too little of the support that the layout promised."""
         upright = points.of(Role.VERTICAL)
-        led, stood = self._layout.support
+        led, stood = layout.support
+        if points.weight[primary] < self.least_support * led:
+            return True
         # Uprights come and go as they are passed; what leads ahead does not.
-        if points.weight[primary] < self.least_support * led or (
-            stood > 0.0 and (upright is None or points.weight[upright] < 0.5 * self.least_support * stood)
-        ):
-            return "little support"
-        return ""
+        return stood > 0.0 and (
+            upright is None or bool(points.weight[upright] < 0.5 * self.least_support * stood)
+        )
+
+
+def _apart(lean: tuple[float, float], other: tuple[float, float]) -> float:
+    return max(abs(lean[0] - other[0]), abs(lean[1] - other[1]))
 
 
 def _head_moved(before: Camera | None, now: Camera) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -104,7 +105,7 @@ class LineDetector:
             region.require_inside(width, height)
         if min(gray.shape) < SMALLEST:
             return LineSegments.empty()
-        scale = min(1.0, float(np.sqrt(self.largest_area / gray.size)))
+        scale = min(1.0, math.sqrt(self.largest_area / gray.size))
         if scale > 0.87:
             scale = 1.0
         shape = (_scaled(height, scale), _scaled(width, scale))
@@ -113,7 +114,7 @@ class LineDetector:
             lines, self._look = finder.find(_resized(gray, shape))
             return _at_size(lines, gray.shape, shape)
         # Seen with a frame around it, edges in the region lie where they lie in the whole picture.
-        frame = int(np.ceil((_FRAME + np.ceil(3.0 * self.blur)) / scale))
+        frame = math.ceil((_FRAME + math.ceil(3.0 * self.blur)) / scale)
         seen = region.widened(frame, width, height)
         part = gray[seen.top : seen.bottom, seen.left : seen.right]
         if min(part.shape) < SMALLEST:

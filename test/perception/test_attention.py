@@ -126,8 +126,36 @@ def test_few_lines_and_little_support_are_surprises() -> None:
     answer = robot.settled()
     weak = replace(answer.vanishing_points, weight=answer.vanishing_points.weight * 0.1)
     lines = lines[np.arange(len(weak.labels)) % len(lines)]
-    assert robot.attention.update(lines, weak, answer.attitude, (robot.picture + 1) / RATE) is None
+    # one such picture is let pass, a second is not
+    assert robot.attention.update(lines, weak, answer.attitude, (robot.picture + 1) / RATE) is not None
+    assert robot.attention.update(lines, weak, answer.attitude, (robot.picture + 2) / RATE) is None
     assert robot.attention.reason == "little support"
+
+
+def test_one_picture_with_little_support_between_good_ones_is_let_pass() -> None:
+    robot = Robot()
+    answer = robot.settled()
+    lines = seen_in(seen_lines(HALL, 0.2, 0.05, robot.random), answer.attention)
+    points = answer.vanishing_points
+    lines = lines[np.arange(len(points.labels)) % len(lines)]
+    for picture in range(1, 7):
+        seen = replace(points, weight=points.weight * 0.1) if picture % 2 else points
+        stamp = (robot.picture + picture) / RATE
+        assert robot.attention.update(lines, seen, answer.attitude, stamp) is not None
+
+
+def test_a_late_picture_of_the_region_is_not_taken_for_a_whole_one() -> None:
+    """Live, everywhere may be heard only after the next picture was searched in part."""
+    robot = Robot(every=6)
+    robot.settled()
+    while robot.attention.asked is not None:
+        last = robot.attention.asked
+        robot.look()
+    for late in (True, False):
+        seen = seen_lines(HALL, 0.2, 0.05, robot.random)
+        robot.picture += 1
+        answer = robot.way.update(seen_in(seen, last) if late else seen, CAMERA, robot.picture / RATE)
+        assert (answer.attention is None) == late, robot.attention.reason
 
 
 def test_a_vanishing_point_that_leaves_the_picture_takes_no_region_along() -> None:
