@@ -16,8 +16,12 @@ from robot_vision.mapping.pose import Pose, PoseHistory
 Array = NDArray[np.float64]
 
 _QUARTER = np.pi / 2
-_SHADOW = 4.0
-"""Factor on the deviation of a face that seems nearer than it can be: floor may seem to end at the wall's shadow."""
+_NEARER, _FARTHER, _RAMP = 0.04, 0.08, 0.03
+"""Cells by which a face may lie nearer or farther than believed and count in full, and over which it loses that: floor
+may seem to end at the wall's shadow, and where it goes on past the end of a wall another one's face may be taken for
+the same."""
+_DOUBTED = 4.0
+"""Factor on the deviation of faces beyond that."""
 
 
 @dataclass
@@ -129,7 +133,7 @@ class GridPose:
             for side in (-1.0, 1.0):
                 short = self._face_error(turned, axis, side, pose)
                 if short is not None:
-                    sigma = self.face_sigma * self.cell * (1.0 if short < 0.0 else _SHADOW)
+                    sigma = self.face_sigma * self.cell * _doubt(short / self.cell)
                     self._correct(stamp_s, axis, side * short, sigma**2 / trust)
 
     def _face_error(self, ends: Array, axis: int, side: float, pose: Pose) -> float | None:
@@ -172,6 +176,12 @@ class GridPose:
         moved = np.array(pose)
         moved[axis] += gain * error
         self._origin = _composed(Pose(*moved.tolist()), _inverted(told[0]))
+
+
+def _doubt(short: float) -> float:
+    """Factor on the deviation of a face that lies `short` cells nearer than believed."""
+    beyond = abs(short) - (_NEARER if short > 0.0 else _FARTHER)
+    return 1.0 + (_DOUBTED - 1.0) * min(max(beyond / _RAMP, 0.0), 1.0)
 
 
 def floor_ends(plan: PlanView, eye: float, reach: float, rays: int = 91) -> Array:

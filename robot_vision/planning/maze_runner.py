@@ -33,6 +33,9 @@ _CREEP = 0.15
 """Cells behind its border up to which a robot may drive into a cell of which it has not seen all walls."""
 _AHEAD = 3
 """Cells of the way that are told beyond the next one, so that the robot need not stop at each."""
+_MIDDLE = 0.04
+"""Cells before the middle of its cell at which the robot has come to it: it turns off there and not before, for its
+corners reach far when it turns on the spot."""
 _OFF_AXIS = 0.15
 """Cells from the middle of its cell from which the robot goes back to it before it turns off."""
 _TWICE_SEEN = 0.03, 0.05
@@ -86,7 +89,7 @@ class MazeRunner:
         self._quest = Quest(self._known)
         begin = Pose(*self._middle(self.start), float(np.pi / 2 * (1 - self.heading)))
         self._pose = GridPose(begin, self.cell, self.wall * self.cell)
-        self._place, self._towards = self.start, self.heading
+        self._place, self._towards, self._came = self.start, self.heading, True
         self._viewed: Pose | None = None
         self._ahead: list[Cell] = []
         self._looks, self._caution, self._reason, self._walled_in = False, False, "", 0
@@ -176,6 +179,7 @@ class MazeRunner:
                 seen = self._up_to_border(pose)
             if self._looks:
                 reason, seen = "looks whether a wall stands there", _way(points[:-1])
+            points = _up_to_turn(points)
         self._route = Route(points, seen, reason, number=number, done=self.stage == "done")
         return self._route
 
@@ -240,7 +244,7 @@ class MazeRunner:
             return
         self._known.see(self._place, direction, False)
         self.steps[self.stage] = self.steps.get(self.stage, 0) + 1
-        self._place, self._towards, self._stale = there, direction, True
+        self._place, self._towards, self._came, self._stale = there, direction, False, True
         self.track.append(there)
 
     def _points(self, pose: Pose) -> NDArray[np.float64]:
@@ -249,8 +253,12 @@ class MazeRunner:
         points = [here, *(np.array(self._middle(place)) for place in self._ahead)]
         off = np.array([pose.x, pose.y]) - here
         axis = int(np.argmax(np.abs(off)))
+        before = -off[0] * (0, 1, 0, -1)[self._towards] - off[1] * (1, 0, -1, 0)[self._towards]
+        self._came = self._came or before < _MIDDLE * self.cell
+        if not self._came:
+            axis = 1 - self._towards % 2
         on_its_way = len(points) > 1 and float(off @ (points[1] - here)) > 0.7 * np.hypot(*off) * self.cell
-        if abs(off[axis]) > _OFF_AXIS * self.cell and not on_its_way:
+        if not on_its_way and (not self._came or abs(off[axis]) > _OFF_AXIS * self.cell):
             beginning = here.copy()
             beginning[axis] += off[axis]
             points.insert(0, beginning)
@@ -274,6 +282,14 @@ class MazeRunner:
                 return _SAME_VIEW
         self._viewed = pose
         return 1.0
+
+
+def _up_to_turn(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The part of a way (M, 2) before it turns off."""
+    pieces = np.diff(points, axis=0)
+    crossed = pieces[:-1, 0] * pieces[1:, 1] - pieces[:-1, 1] * pieces[1:, 0]
+    turns = np.flatnonzero(np.abs(crossed) > 1e-9)
+    return points[: turns[0] + 2] if len(turns) else points
 
 
 def _way(points: NDArray[np.float64]) -> float:

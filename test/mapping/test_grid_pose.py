@@ -78,6 +78,21 @@ def test_a_vanishing_point_far_off_is_not_believed() -> None:
     assert pose.pose == pytest.approx(Pose(0.5, 0.5, 0.0))
 
 
+@pytest.mark.parametrize(("off", "left"), [(0.03, 0.015), (-0.03, 0.025), (0.2, 0.2), (-0.2, 0.2)])
+def test_a_face_a_little_off_is_believed_to_both_sides_and_one_far_off_hardly(
+    off: float, left: float
+) -> None:
+    pose = GridPose(Pose(2.5, 0.5, 0.0), 1.0, WALL)
+    pose.move(0.0, Pose(0.0, 0.0, 0.0))
+    for _ in range(60):
+        pose.see_plan(0.0, plan_from(HALL, Pose(2.5 + off, 0.5, 0.0)), EYE)
+    told = pose.pose
+    assert told is not None
+    error = abs(2.5 + off - told.x)
+    assert error < left
+    assert abs(off) < 0.1 or error > 0.15
+
+
 def test_without_odometry_there_is_no_place() -> None:
     pose = GridPose(Pose(0.5, 0.5, 0.0), 1.0, WALL)
     pose.see_plan(0.0, plan_from(HALL, Pose(0.5, 0.5, 0.0)), EYE)

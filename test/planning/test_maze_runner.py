@@ -42,6 +42,7 @@ def test_mazes_are_explored_and_run_the_shortest_way() -> None:
         run = explore(maze, seed, look=by_rays(maze, seed))
         assert run.done
         assert run.contacts == 0
+        assert run.closest_m > 0.05
         assert run.wrong == 0
         assert run.track_true
         assert run.ran == run.shortest == len(run.perfect.shortest_path) - 1
@@ -71,6 +72,18 @@ def test_the_way_ends_before_what_nobody_has_seen() -> None:
     assert route.seen == 0.0
     assert "looks" in route.reason
     assert route.points[-1] == pytest.approx((0.5, 1.5))
+
+
+def test_the_robot_turns_off_in_the_middle_of_a_cell_and_not_before() -> None:
+    maze = Maze.parse("+---+---+\n|     G |\n+   +---+\n| S |   |\n+---+---+\n")
+    runner = MazeRunner(maze.size, maze.goals)
+    for number, y in enumerate((*np.linspace(0.5, 1.44, 20), 1.52)):
+        north = Pose(0.5, float(y), np.pi / 2)
+        runner.move(0.2 * number, north)
+        runner.see_plan(0.2 * number, plan_from(maze, north), EYE)
+        points = runner.route().points
+        assert points[-1] == pytest.approx((0.5, 1.5) if y < 1.45 else (1.5, 1.5))
+    assert points[0] == pytest.approx((0.5, 1.5))
 
 
 def test_settings_that_make_no_sense_are_refused() -> None:
