@@ -37,8 +37,8 @@ _OUTSIDE, _SURELY = 0.03, 3
 class Attention:
     """Chooses, from what one picture showed, where lines are looked for in the next.
 
-    A part of a picture may be misread now and then: one picture that shows little or no support of the way ahead, or an
-    attitude that jumps, is let pass, a second in a row is a surprise. All else that is odd is a surprise at once.
+    A part of a picture may be misread now and then: one picture with little support, or with an attitude that jumps,
+    is let pass, a second in a row is a surprise. All else that is odd is a surprise at once.
 
     Args:
         budget: cost of a look at the region, as a share of one at the whole picture.
@@ -158,8 +158,7 @@ class Attention:
         if lean is not None:
             self._leans = lean
         primary = points.of(Role.PRIMARY)
-        lost = primary is not None and points.weight[primary] <= 0.0
-        if primary is None or lost and (self._layout is None or odd_before):
+        if primary is None or points.weight[primary] <= 0.0:
             return "no way ahead is seen"
         if not points.camera.focal_known:
             return "the focal length is not known"
@@ -177,9 +176,7 @@ class Attention:
         if len(lines) < self.least_lines * self._layout.lines:
             return "few lines"
         odd = ""
-        if lost:
-            odd = "no way ahead is seen"
-        elif self._is_weak(points, primary, self._layout):
+        if self._is_weak(points, primary, self._layout):
             odd = "little support"
         elif lean is not None and before is not None and _apart(lean, before) > self.jump:
             odd, self._leans = "the attitude jumps", before

@@ -146,7 +146,7 @@ def test_one_picture_with_little_support_between_good_ones_is_let_pass() -> None
 
 def test_a_late_picture_of_the_region_is_not_taken_for_a_whole_one() -> None:
     """Live, everywhere may be heard only after the next picture was searched in part."""
-    robot = Robot(every=4)
+    robot = Robot(every=6)
     robot.settled()
     while robot.attention.asked is not None:
         last = robot.attention.asked
