@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What looking where it matters saves of the cost of finding lines, and what it does to every score.
 
-Each set goes once through the objects that the nodes call, picture by picture everywhere and with attention side by side,
-so that whatever else the machine does meets both alike.
+Each set goes once through the objects that the nodes call, picture by picture everywhere and with attention side by
+side, so that whatever else the machine does meets both alike.
 """
 
 from __future__ import annotations
