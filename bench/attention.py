@@ -104,7 +104,8 @@ def run(quick: bool) -> list[Table]:
     rows: list[Row] = []
     notes = [
         f"CPU of a picture: the least of {ROUNDS} searches, everywhere and with attention in turn; share: of the sums",
-        "settings were chosen on other simulated drives and on the first half of KITTI's",
+        "settings were chosen on other simulated drives and on the first half of KITTI's; that a lost way ahead is",
+        "a surprise at once, on all of it",
     ]
     cv2.setNumThreads(1)
     with tempfile.TemporaryDirectory(prefix="robot_vision-") as scratch:
