@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 
 from robot_vision.bags import BagWriter, messages
 
-TIMEOUT = 30.0
+TIMEOUT = 60.0
 IMAGE = "sensor_msgs/msg/Image"
 ODOMETRY = "nav_msgs/msg/Odometry"
 
