@@ -54,8 +54,15 @@ class Graph:
     def until(self, condition: Callable[[], Any], what: str) -> None:
         end = time.monotonic() + TIMEOUT
         while not condition():
-            assert time.monotonic() < end, f"waited {TIMEOUT} s in vain: {what}"
+            assert time.monotonic() < end, f"waited {TIMEOUT} s in vain: {what}; {self._processes()}"
             self.executor.spin_once(timeout_sec=0.05)
+
+    def _processes(self) -> str:
+        """How the processes fare, for whoever waited in vain."""
+        codes = {" ".join(process.args[2:]): process.poll() for process in self.processes}
+        return "; ".join(
+            f"{name}: {'runs' if code is None else f'ended with {code}'}" for name, code in codes.items()
+        )
 
     def ended(self, process: Any) -> str:
         """Wait for the end of a process that must end well; returns what it said."""
