@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 SECTIONS = 8
 _SAMPLES, _ACROSS = 3, 5
+RIM = (0.02, 0.07)
+"""Strip beside a line that a shadow's edge has in shadow, m: a shadow need not be wider."""
 
 
 class Beside:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry.sphere import normalised
-from robot_vision.mapping.beside_lines import Beside
+from robot_vision.mapping.beside_lines import RIM, Beside
 from robot_vision.mapping.boundary import Boundary
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.perception import LineSegments, Role, VanishingPoints
@@ -19,9 +19,6 @@ from robot_vision.perception import LineSegments, Role, VanishingPoints
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Scores = NDArray[np.float32]
-
-_RIM = (0.02, 0.07)
-"""Strip beside a line that a shadow's edge has in shadow, m: a shadow need not be wider."""
 
 
 class LineKind(IntEnum):
@@ -123,7 +120,7 @@ class GroundLines:
         floor = np.nanmax(near, axis=(0, 2), initial=-np.inf) > 0.0
         kinds[chosen[floor]] = LineKind.GROUND
         ends, near = ends[floor], near[:, floor]
-        rim = Beside(ends, view, vanishing, _RIM)
+        rim = Beside(ends, view, vanishing, RIM)
         stops = self._stops(near, rim.means(score), rim.means(dim.astype(np.float32)) < 0.4)
         kinds[chosen[floor][stops.any(axis=(0, 2))]] = LineKind.BORDER
         return kinds, Borders.along(ends, stops)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.mapping.beside_lines import Beside
+from robot_vision.mapping.beside_lines import RIM, Beside
 from robot_vision.mapping.ground_lines import Borders
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.pose import Pose
@@ -18,7 +18,6 @@ Mask = NDArray[np.bool_]
 Scores = NDArray[np.float32]
 
 _SECTIONS = 16
-_RIM = (0.02, 0.07)
 _LEFT, _RIGHT = 0, 1
 
 
@@ -151,7 +150,7 @@ class KerbFinder:
     ) -> Mask:
         """Sections (2, M, sections) to whose left or right a kerb stands."""
         beside, beyond, rim = (
-            Beside(rays, view, vanishing, strip, _SECTIONS) for strip in (self.beside, self.beyond, _RIM)
+            Beside(rays, view, vanishing, strip, _SECTIONS) for strip in (self.beside, self.beyond, RIM)
         )
         near, behind = beside.means(score), beyond.means(score)
         like = (near > 0.0) & (near[::-1] > 0.0) & np.isfinite(behind)

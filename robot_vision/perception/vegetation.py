@@ -157,15 +157,7 @@ class VegetationMask:
         Raises:
             ValueError: the array is no such picture.
         """
-        index = vegetation_index(picture, self.index, self.blur)
-        infrared = picture.ndim == 2 or self.index == "infrared"
-        if infrared:
-            # soil reflects the near infrared as well; what grows is brighter than the rest
-            index = index - np.float32(index.mean(dtype=np.float64))
-        levels = cv2.convertScaleAbs(np.maximum(index, 0.0), alpha=_LEVELS)
-        if not infrared:
-            # where all channels are dark, colour is noise
-            levels[cv2.cvtColor(np.asarray(picture), cv2.COLOR_BGR2GRAY) < _BLACK] = 0
+        levels = _index_levels(picture, self.index, self.blur)
         threshold, _ = cv2.threshold(levels, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
         floor = self.floor * _LEVELS
         low = cv2.threshold(levels, max(self.lower * threshold, floor), 1, cv2.THRESH_BINARY)[1]
@@ -222,13 +214,21 @@ class LeafMask:
         Raises:
             ValueError: the array is no such picture.
         """
-        index = vegetation_index(picture, self.index, self.blur)
-        infrared = picture.ndim == 2 or self.index == "infrared"
-        if infrared:
-            index = index - np.float32(index.mean(dtype=np.float64))
-        levels = cv2.convertScaleAbs(np.maximum(index, 0.0), alpha=_LEVELS)
-        if not infrared:
-            levels[cv2.cvtColor(np.asarray(picture), cv2.COLOR_BGR2GRAY) < _BLACK] = 0
+        levels = _index_levels(picture, self.index, self.blur)
         greatest = cv2.dilate(levels, np.ones((self.around, self.around), np.uint8))
         border = np.maximum(self.share * greatest, self.floor * _LEVELS)
         return np.asarray(levels > border)
+
+
+def _index_levels(picture: Picture, kind: Index, blur: float) -> NDArray[np.uint8]:
+    """Index of what grows (H, W) in grey levels, `_LEVELS` to one; 0 where nothing does."""
+    index = vegetation_index(picture, kind, blur)
+    infrared = picture.ndim == 2 or kind == "infrared"
+    if infrared:
+        # soil reflects the near infrared as well; what grows is brighter than the rest
+        index = index - np.float32(index.mean(dtype=np.float64))
+    levels = np.asarray(cv2.convertScaleAbs(np.maximum(index, 0.0), alpha=_LEVELS), np.uint8)
+    if not infrared:
+        # where all channels are dark, colour is noise
+        levels[cv2.cvtColor(np.asarray(picture), cv2.COLOR_BGR2GRAY) < _BLACK] = 0
+    return levels
