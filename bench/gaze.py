@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -137,8 +137,8 @@ def score(
 
 
 def _table(title: str, scores: list[list[Score]], stretch: tuple[float, float] = STRETCH_M) -> Table:
-    def cells(value: object) -> list[Cell]:
-        return [Cell(float(value(drives))) for drives in scores]  # type: ignore[operator]
+    def cells(value: Callable[[list[Score]], float]) -> list[Cell]:
+        return [Cell(float(value(drives))) for drives in scores]
 
     def joined(drives: list[Score], name: str) -> NDArray[np.float64]:
         return np.concatenate([getattr(one, name) for one in drives])

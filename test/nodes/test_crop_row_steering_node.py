@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,10 +61,11 @@ def field() -> list[Moment]:
     return moments(12)
 
 
-@pytest.fixture(scope="module")
-def bench(ros_domain: int) -> Iterator[NodeBench]:
+@contextmanager
+def row_bench(domain: int, heard: Sequence[tuple[Any, str]]) -> Iterator[NodeBench]:
+    """The node with pictures, calibration and odometry to hear, and somebody who hears these of its topics."""
     settings = {"transport": "compressed", "timeout": 20.0, "ready_patience": 0.1, **PLACE}
-    bench = NodeBench(ros_domain, "crop_row_steering", settings)
+    bench = NodeBench(domain, "crop_row_steering", settings)
     try:
         for kind, topic in (
             (CompressedImage, "image/compressed"),
@@ -71,12 +73,18 @@ def bench(ros_domain: int) -> Iterator[NodeBench]:
             (Odometry, "odom"),
         ):
             bench.speaks(kind, topic)
-        bench.hears(PoseWithCovarianceStamped, "heading")
-        bench.hears(TwistStamped, "steering")
+        for kind, topic in heard:
+            bench.hears(kind, topic)
         bench.connect()
         yield bench
     finally:
         bench.close()
+
+
+@pytest.fixture(scope="module")
+def bench(ros_domain: int) -> Iterator[NodeBench]:
+    with row_bench(ros_domain, ((PoseWithCovarianceStamped, "heading"), (TwistStamped, "steering"))) as made:
+        yield made
 
 
 def see(bench: NodeBench, moment: Moment, jpeg: bytes | None = None) -> TwistStamped:
@@ -96,51 +104,35 @@ FIELDS = ("x", "y", "z", "area", "id", "kind")
 def test_it_knows_each_plant_and_says_which_to_spray(field: list[Moment]) -> None:
     from robot_vision.ros.domains import FreeDomain
 
-    with FreeDomain() as domain:
-        settings = {"transport": "compressed", "timeout": 20.0, "ready_patience": 0.1, **PLACE}
-        bench = NodeBench(domain.id, "crop_row_steering", settings)
-        try:
-            for kind, topic in (
-                (CompressedImage, "image/compressed"),
-                (CameraInfo, "camera_info"),
-                (Odometry, "odom"),
-            ):
-                bench.speaks(kind, topic)
-            bench.hears(TwistStamped, "steering")
-            bench.hears(PointCloud2, "plants")
-            bench.hears(PointCloud2, "spray")
-            bench.connect()
-            bench.say_surely("camera_info", CameraInfo(**CAMERA.camera_info()))
-            ids = []
-            for moment in field:
-                header = see(bench, moment).header
-                plants = points_from_cloud(bench.answer("plants", header), FIELDS)
-                spray = bench.answer("spray", header)
-                jets = points_from_cloud(spray, (*FIELDS, "lane", "time_to_nozzle"))
-                ids.append(set(plants["id"].tolist()))
-                assert len(ids[-1]) == len(plants)
-                assert set(jets["id"].tolist()) <= ids[-1]
-                assert (jets["kind"] == PlantKind.WEED).all()
-            assert spray.header.frame_id == "base_link"
-            assert len(plants) > 20
-            assert len(ids[-1] & ids[-2]) > 0.8 * len(ids[-2])
-            assert len(jets) > 3
-            nozzles = -0.48 + 0.04 * (jets["lane"] + 0.5)
-            assert np.abs(jets["y"] - nozzles).max() < 0.02 + 0.5 * np.sqrt(jets["area"].max() / np.pi) + 1e-6
-            assert bench.set_parameter("spray.lanes", 0).successful is False
-            assert bench.set_parameter("sensitivity", "low").successful
-            # pictures go on, odometry does not: nobody knows where the weeds are when the boom comes
-            for moment in field[:8]:
-                header = bench.header("camera_optical_frame", PERIOD_NS)
-                data = np.frombuffer(moment.jpeg, np.uint8)
-                bench.say(
-                    "image/compressed", CompressedImage(header=header, format="jpeg", data=data.tobytes())
-                )
-                spray = bench.answer("spray", header)
-            assert len(points_from_cloud(spray, FIELDS)) == 0
-            bench.until(lambda: "odometry" in bench.state("spray"), "diagnostics say why nothing is sprayed")
-        finally:
-            bench.close()
+    heard = ((TwistStamped, "steering"), (PointCloud2, "plants"), (PointCloud2, "spray"))
+    with FreeDomain() as domain, row_bench(domain.id, heard) as bench:
+        bench.say_surely("camera_info", CameraInfo(**CAMERA.camera_info()))
+        ids = []
+        for moment in field:
+            header = see(bench, moment).header
+            plants = points_from_cloud(bench.answer("plants", header), FIELDS)
+            spray = bench.answer("spray", header)
+            jets = points_from_cloud(spray, (*FIELDS, "lane", "time_to_nozzle"))
+            ids.append(set(plants["id"].tolist()))
+            assert len(ids[-1]) == len(plants)
+            assert set(jets["id"].tolist()) <= ids[-1]
+            assert (jets["kind"] == PlantKind.WEED).all()
+        assert spray.header.frame_id == "base_link"
+        assert len(plants) > 20
+        assert len(ids[-1] & ids[-2]) > 0.8 * len(ids[-2])
+        assert len(jets) > 3
+        nozzles = -0.48 + 0.04 * (jets["lane"] + 0.5)
+        assert np.abs(jets["y"] - nozzles).max() < 0.02 + 0.5 * np.sqrt(jets["area"].max() / np.pi) + 1e-6
+        assert bench.set_parameter("spray.lanes", 0).successful is False
+        assert bench.set_parameter("sensitivity", "low").successful
+        # pictures go on, odometry does not: nobody knows where the weeds are when the boom comes
+        for moment in field[:8]:
+            header = bench.header("camera_optical_frame", PERIOD_NS)
+            data = np.frombuffer(moment.jpeg, np.uint8)
+            bench.say("image/compressed", CompressedImage(header=header, format="jpeg", data=data.tobytes()))
+            spray = bench.answer("spray", header)
+        assert len(points_from_cloud(spray, FIELDS)) == 0
+        bench.until(lambda: "odometry" in bench.state("spray"), "diagnostics say why nothing is sprayed")
 
 
 def heading_of(bench: NodeBench, steering: TwistStamped) -> PoseWithCovarianceStamped | None:
