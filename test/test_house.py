@@ -216,6 +216,11 @@ def test_a_room_of_the_library_imports_fast(room: str) -> None:
     assert run.returncode == 0, run.stderr
 
 
+def test_who_only_plans_need_not_load_what_sees() -> None:
+    run = run_python(HEAVY, "robot_vision.perception,robot_vision.mapping,scipy", "robot_vision.planning")
+    assert run.returncode == 0, run.stderr
+
+
 def test_the_command_line_imports_fast() -> None:
     run = run_python(HEAVY, "numba,matplotlib,rosbags,cv2,scipy,numpy,rclpy", "robot_vision.cli")
     assert run.returncode == 0, run.stderr

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ways to a goal: on grids of free floor, and through mazes that are known or not yet."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from robot_vision.planning.clearance import room_around, with_clearance
 from robot_vision.planning.descent import descend
 from robot_vision.planning.distance import ExactField, distance_field, exact_field, shortest_way
@@ -11,13 +14,15 @@ from robot_vision.planning.frontiers import frontiers
 from robot_vision.planning.grid import NoWayError, PlanningError
 from robot_vision.planning.maze import Maze, MazeError
 from robot_vision.planning.maze_grid import maze_from_grid, maze_to_grid
-from robot_vision.planning.maze_runner import MazeRunner
 from robot_vision.planning.navigator import Navigator, Route
 from robot_vision.planning.path import nearest_reachable, plan_path
 from robot_vision.planning.pictures import draw_field, draw_maze, letters
 from robot_vision.planning.quest import Quest
 from robot_vision.planning.speed_run import Racer, SpeedRun, fastest_run, shortest_run
-from robot_vision.planning.wall_evidence import WallEvidence
+
+if TYPE_CHECKING:
+    from robot_vision.planning.maze_runner import MazeRunner
+    from robot_vision.planning.wall_evidence import WallEvidence
 
 __all__ = [
     "ExactField",
@@ -54,3 +59,15 @@ __all__ = [
     "shortest_way",
     "with_clearance",
 ]
+
+#: They know plans of the floor; those who only plan need not wait until everything that sees has been imported.
+_BY_CAMERA = {
+    "MazeRunner": "robot_vision.planning.maze_runner",
+    "WallEvidence": "robot_vision.planning.wall_evidence",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _BY_CAMERA:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_BY_CAMERA[name]), name)

@@ -180,13 +180,16 @@ def _write(distance, roots, root, row, first, last, x, step, height2, base):
 
 
 @njit(cache=True, error_model="numpy")
-def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, far_j, stack, corners, count):
+def scan_cone(
+    free, distance, roots, shift, root, x2, y2, base, hx, sy, cone, far_i, far_j, stack, corners, count
+):
     """Write the distances of all cells a root sees within its cone, and collect the corners it meets.
 
     Args:
         free: uint8 (R + 2, C + 2), padded by a border of walls.
-        distance: float64 (R, C), lowered where the root offers less; cells.
-        roots: int32 (R, C), the root of each cell; (0, 0) if not wanted.
+        distance: float64, lowered where the root offers less; cells.
+        roots: int32, the root of each cell; (0, 0) if not wanted.
+        shift: row, column in these two of the padded grid's corner.
         root: number of this root.
         x2: its column in the padded grid, doubled.
         y2: its row, doubled.
@@ -201,13 +204,15 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
         count: how many corners it already holds.
 
     Returns:
-        The new count; FULL if a buffer is too small: then give larger ones and scan again, no harm is done.
+        The new count, and whether `far_i` or `far_j` kept it from looking farther. FULL in place of the count if a
+        buffer is too small: then give larger ones and scan again, no harm is done.
     """
+    is_cut = False
     off = x2 & 1
     keep = roots.size > 0
     column0 = (x2 >> 1) if hx > 0 or off == 1 else (x2 >> 1) - 1
     row0 = (y2 >> 1) if sy > 0 or off == 1 else (y2 >> 1) - 1
-    origin = column0 - 1  # in rows that are not padded
+    origin = column0 + shift[1]
     x0 = 0.5 * (1 - off)
     stack[0, 0] = 0
     for k in range(4):
@@ -217,6 +222,7 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
         depth -= 1
         i = stack[depth, 0]
         if i > far_i:
+            is_cut = True
             continue
         left_u, left_v, right_u, right_v = (
             stack[depth, 1],
@@ -225,6 +231,7 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
             stack[depth, 4],
         )
         r = row0 + sy * i
+        out = r + shift[0]
         top = 2 * i - off
         middle, bottom = top + 1, top + 2
         height2 = 0.25 * middle * middle
@@ -250,7 +257,7 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                     and free[r - sy, column0 + hx * (j - 1)] != 0
                 ):
                     if count == len(corners):
-                        return FULL
+                        return FULL, is_cut
                     _met(corners, count, (x2 + hx * a) >> 1, (y2 + sy * top) >> 1, a, top, hx, sy, 0)
                     count += 1
                 if a * right_v >= right_u * top:
@@ -261,6 +268,7 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
             while end <= last_bottom and free[r, column0 + hx * end] != 0:
                 end += 1
             j = end + 1
+            is_cut = is_cut or end > far_j
             wall_right = free[r, column0 + hx * end] == 0
             b = 2 * end - off
             lu, lv, ru, rv = left_u, left_v, right_u, right_v
@@ -278,7 +286,7 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                 first, last = (low, high) if low <= high else (max(start, low - 1), min(low, end - 1))
                 base_less = base - TOLERANCE
                 reach = _covered_from_left(
-                    distance, r - 1, first, last, hx, origin, x0, height2, base_less, begin
+                    distance, out, first, last, hx, origin, x0, height2, base_less, begin
                 )
                 if reach >= finish or reach >= 0.5 * b:
                     continue
@@ -289,7 +297,7 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                 if finish < np.inf or wall_right:
                     edge = min(finish, 0.5 * b)
                     reach = _covered_from_right(
-                        distance, r - 1, low, high, hx, origin, x0, height2, base_less, edge
+                        distance, out, low, high, hx, origin, x0, height2, base_less, edge
                     )
                     cut = int(math.ceil(2.0 * reach))
                     if reach < edge and (rv == 0 or cut * rv < ru * middle):
@@ -301,16 +309,16 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                 nearest, outermost = (low, high) if hx > 0 else (high, low)
                 first, last = origin + hx * nearest, origin + hx * outermost
                 if keep:
-                    _write(distance, roots, root, r - 1, first, last, nearest + x0, hx, height2, base)
+                    _write(distance, roots, root, out, first, last, nearest + x0, hx, height2, base)
                 else:
-                    _lower(distance, r - 1, first, last, nearest + x0, hx, height2, base)
+                    _lower(distance, out, first, last, nearest + x0, hx, height2, base)
             # on to the next row
             if lu * bottom > b * lv:
                 continue
             if wall_right and (rv == 0 or b * rv <= ru * bottom):
                 if free[r + sy, column0 + hx * end] != 0 and free[r + sy, column0 + hx * (end - 1)] != 0:
                     if count == len(corners):
-                        return FULL
+                        return FULL, is_cut
                     _met(corners, count, (x2 + hx * b) >> 1, (y2 + sy * bottom) >> 1, b, bottom, hx, sy, 1)
                     count += 1
                 ru, rv = b, bottom
@@ -318,11 +326,12 @@ def scan_cone(free, distance, roots, root, x2, y2, base, hx, sy, cone, far_i, fa
                 ru, rv = b, bottom
             if lu * rv < ru * lv:
                 if depth == len(stack):
-                    return FULL
+                    return FULL, is_cut
                 stack[depth, 0] = i + 1
                 stack[depth, 1] = lu
                 stack[depth, 2] = lv
                 stack[depth, 3] = ru
                 stack[depth, 4] = rv
                 depth += 1
-    return count
+        is_cut = is_cut or far_j < j <= last_top + 1
+    return count, is_cut

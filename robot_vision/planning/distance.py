@@ -7,8 +7,10 @@ passes neither through them nor between two that touch in a point. `cones` tells
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +31,10 @@ _FIRST_GUESS, _FIRST_MARGIN = 1.3, 2.0
 """A way is first looked for up to this multiple of the straight line, and so many cells more."""
 _WIDER = 2.2
 """Then up to so many times that length."""
+_NEAR, _NEAR_MARGIN, _NEAR_WIDER = 3.0, 64.0, 4.0
+"""The same where all around the goal is looked for, no farther than the robot: a wide bound costs little there."""
+_REACH = 32.0
+"""Cells; so far around a corner is looked first when the robot is not to be passed by much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,19 +94,21 @@ def distance_field(
     grid, place, robot = _checked(free, goal, resolution, until)
     distance = np.full(grid.shape, np.inf)
     if robot is None:
-        _spread(grid, place, None, False, np.inf, distance, _NO_ROOTS)
+        _spread(grid, place, distance, _NO_ROOTS)
         return _in_metres(distance, resolution)
-    for bound in _bounds(place, robot):
-        window = _window(grid.shape, (place, place), bound)
-        end, shape = _inside(window, robot), _shape(window)
-        if shape == grid.shape:
+    for bound in _bounds(_NEAR * _straight(place, robot) + _NEAR_MARGIN, _NEAR_WIDER):
+        window = _around(grid.shape, place, bound)
+        part, corner = grid[window], (window[0].start, window[1].start)
+        if part.shape == grid.shape:
             bound = np.inf
-        part = np.full(shape, np.inf)
-        _spread(grid[window], _inside(window, place), end, False, bound, part, _NO_ROOTS)
-        if part[end] <= bound + _SLACK:
-            part[part > part[end] + _SLACK] = np.inf
-            distance[window] = _in_metres(part, resolution)
+        first, last = _inside(window, robot), _inside(window, place)
+        spread = _spread(part, last, distance, _NO_ROOTS, first, bound=bound, reach=_REACH, corner=corner)
+        near = distance[spread.written]
+        if distance[robot] <= bound + _SLACK:
             break
+        near[:] = np.inf
+    np.copyto(near, np.inf, where=near > distance[robot] + _SLACK)
+    _in_metres(near, resolution)
     return distance
 
 
@@ -112,8 +120,8 @@ def exact_field(free: ArrayLike, goal: Sequence[float], resolution: float = 1.0)
     """
     grid, place, _ = _checked(free, goal, resolution, None)
     distance, roots = np.full(grid.shape, np.inf), np.zeros(grid.shape, np.int32)
-    corners, before = _spread(grid, place, None, False, np.inf, distance, roots)
-    return ExactField(_in_metres(distance, resolution), roots, corners, before, resolution)
+    spread = _spread(grid, place, distance, roots)
+    return ExactField(_in_metres(distance, resolution), roots, spread.corners, spread.before, resolution)
 
 
 def shortest_way(free: ArrayLike, start: Sequence[float], goal: Sequence[float]) -> NDArray[np.float64]:
@@ -133,19 +141,19 @@ def shortest_way(free: ArrayLike, start: Sequence[float], goal: Sequence[float])
     begin = checked_free_cell(grid, start, "start")
     if begin == end:
         return np.array([begin, end], np.float64)
-    for bound in _bounds(end, begin):
+    for bound in _bounds(_FIRST_GUESS * _straight(begin, end) + _FIRST_MARGIN, _WIDER):
         window = _window(grid.shape, (begin, end), bound)
-        shape = _shape(window)
-        if shape == grid.shape:
+        part = grid[window]
+        if part.shape == grid.shape:
             bound = np.inf
-        distance, roots = np.full(shape, np.inf), np.zeros(shape, np.int32)
+        distance, roots = np.full(part.shape, np.inf), np.zeros(part.shape, np.int32)
         first, last = _inside(window, begin), _inside(window, end)
-        corners, before = _spread(grid[window], last, first, True, bound, distance, roots)
+        spread = _spread(part, last, distance, roots, first, heads_for_target=True, bound=bound)
         if distance[first] <= bound + _SLACK:
             break
     if not np.isfinite(distance[first]):
         raise NoWayError(f"no way leads from {begin} to {end}: walls lie between them")
-    way = ExactField(distance, roots, corners, before, 1.0).way_from(first)
+    way = ExactField(distance, roots, spread.corners, spread.before, 1.0).way_from(first)
     return way + (window[0].start, window[1].start)
 
 
@@ -162,17 +170,28 @@ def _checked(
     return grid, place, None if until is None else checked_free_cell(grid, until, "until")
 
 
-def _bounds(a: Cell, b: Cell) -> list[float]:
-    """Lengths up to which a way from a to b is looked for, one after the other; the last one is longer than any."""
-    straight = float(np.hypot(a[0] - b[0], a[1] - b[1]))
-    first = _FIRST_GUESS * straight + _FIRST_MARGIN
-    return [*(first * _WIDER**k for k in range(60)), np.inf]
+def _straight(a: Cell, b: Cell) -> float:
+    return math.hypot(a[0] - b[0], a[1] - b[1])
+
+
+def _bounds(first: float, wider: float) -> Iterator[float]:
+    """Lengths up to which a way is looked for, one after the other; the last one is longer than any."""
+    yield from (first * wider**k for k in range(60))
+    yield np.inf
+
+
+def _around(shape: tuple[int, ...], place: Cell, bound: float) -> _Window:
+    """The part of a grid that holds every way up to a length from a cell."""
+    wide = int(min(bound, sum(shape))) + 1
+    rows, columns = (
+        slice(max(0, at - wide), min(end, at + wide + 1)) for at, end in zip(place, shape, strict=True)
+    )
+    return rows, columns
 
 
 def _window(shape: tuple[int, ...], ends: tuple[Cell, Cell], bound: float) -> _Window:
     """The part of a grid that holds every way up to a length between two cells (an ellipse's frame)."""
-    straight = float(np.hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1]))
-    around = float(np.sqrt(bound**2 - straight**2)) / 2 if straight else bound
+    around = math.sqrt(bound**2 - _straight(*ends) ** 2) / 2
     if not around < sum(shape):
         return slice(0, shape[0]), slice(0, shape[1])
     wide = int(around) + 1
@@ -181,10 +200,6 @@ def _window(shape: tuple[int, ...], ends: tuple[Cell, Cell], bound: float) -> _W
         slice(max(0, rows[0] - wide), min(shape[0], rows[1] + wide + 1)),
         slice(max(0, columns[0] - wide), min(shape[1], columns[1] + wide + 1)),
     )
-
-
-def _shape(window: _Window) -> tuple[int, int]:
-    return window[0].stop - window[0].start, window[1].stop - window[1].start
 
 
 def _inside(window: _Window, cell: Cell) -> Cell:
@@ -198,17 +213,38 @@ def _in_metres(distance: NDArray[np.float64], resolution: float) -> NDArray[np.f
     return distance
 
 
+class _Spread(NamedTuple):
+    """What the kernel tells.
+
+    Attributes:
+        corners: float64 (N, 2) row, column in the grid it spread over; the first is the goal.
+        before: int32 (N,), which one comes before each.
+        written: part of the distances outside which nothing was written.
+    """
+
+    corners: NDArray[np.float64]
+    before: NDArray[np.int32]
+    written: _Window
+
+
 def _spread(
     free: NDArray[np.bool_],
     goal: Cell,
-    target: Cell | None,
-    heads_for_target: bool,
-    bound: float,
     distance: NDArray[np.float64],
     roots: NDArray[np.int32],
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Call the kernel; returns corners (N, 2) row, column and what comes before each."""
+    target: Cell = (-1, -1),
+    *,
+    heads_for_target: bool = False,
+    bound: float = np.inf,
+    reach: float = np.inf,
+    corner: Cell = (0, 0),
+) -> _Spread:
+    """Call the kernel; `corner` is where in `distance` and `roots` the corner of the grid lies."""
     from robot_vision.planning.spreading import spread  # numba: slow to import
 
-    place = spread(padded(free), goal, target or (-1, -1), heads_for_target, bound, distance, roots)
-    return place[:, 1::-1] * 0.5 - 1.5, place[:, 2].copy()
+    shift = corner[0] - 1, corner[1] - 1
+    place, *spans = spread(padded(free), goal, target, heads_for_target, bound, reach, distance, roots, shift)
+    rows, columns = (
+        slice(max(0, at + first), at + last + 1) for at, (first, last) in zip(corner, spans, strict=True)
+    )
+    return _Spread(place[:, 1::-1] * 0.5 - 1.5, place[:, 2].copy(), (rows, columns))

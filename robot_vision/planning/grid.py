@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,7 +39,7 @@ def checked_cell(shape: tuple[int, ...], cell: Sequence[float], what: str) -> Ce
     Raises:
         PlanningError: it lies outside, or is no row and column.
     """
-    if len(cell) != 2 or not all(np.isfinite(part) and part == int(part) for part in cell):
+    if len(cell) != 2 or not all(math.isfinite(part) and part == int(part) for part in cell):
         raise PlanningError(f"{what} must be a row and a column in whole numbers, not {tuple(cell)}")
     row, column = int(cell[0]), int(cell[1])
     if not (0 <= row < shape[0] and 0 <= column < shape[1]):
@@ -65,7 +66,7 @@ def checked_positive(value: float, what: str) -> float:
     Raises:
         PlanningError: it is none.
     """
-    if not (np.isfinite(value) and value > 0.0):
+    if not (math.isfinite(value) and value > 0.0):
         raise PlanningError(f"{what} must be a positive number, not {value}")
     return float(value)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from robot_vision.planning import (
     NoWayError,
     PlanningError,
+    distance,
     distance_field,
     exact_field,
     shortest_way,
@@ -47,15 +48,29 @@ def test_it_is_exact_on_random_grids(count: int, most: int) -> None:
         assert np.allclose(found, true, rtol=0, atol=ROUNDING), (free, goal)
 
 
-def test_until_leaves_out_what_is_farther_than_the_robot() -> None:
+@pytest.mark.parametrize(("reach", "bound"), [(1.0, 2.0), (4.0, 1000.0), (32.0, 64.0)])
+def test_until_leaves_out_what_is_farther_than_the_robot(
+    reach: float, bound: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(distance, "_REACH", reach)  # the least ones: roots are looked around again and again
+    monkeypatch.setattr(distance, "_NEAR", 1.0)
+    monkeypatch.setattr(distance, "_NEAR_MARGIN", bound)  # and whole searches begin anew
     random = np.random.default_rng(2)
     for _ in range(300):
-        free = random_grid(random, 30)
+        free = random_grid(random, 60)
         goal, robot = random_cell(random, free), random_cell(random, free)
         whole, part = distance_field(free, goal), distance_field(free, goal, until=robot)
         near = whole <= whole[robot] + ROUNDING
         assert np.allclose(part[near & np.isfinite(whole)], whole[near & np.isfinite(whole)], atol=ROUNDING)
         assert np.isinf(part[~near]).all()
+
+
+def test_until_costs_what_lies_around_the_robot_and_not_what_the_whole_grid_does() -> None:
+    open_floor, goal = np.ones((900, 700), bool), (500, 300)
+    written = np.full(open_floor.shape, np.inf)
+    distance._spread(open_floor, goal, written, distance._NO_ROOTS, (503, 304), reach=distance._REACH)
+    rows, columns = np.nonzero(np.isfinite(written))
+    assert np.hypot(rows - 500, columns - 300).max() <= 2 * distance._REACH
 
 
 def test_ways_are_as_long_as_the_field_says_and_keep_out_of_walls() -> None:
