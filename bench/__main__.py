@@ -40,6 +40,7 @@ BENCHMARKS = {
     "fields": "speed, memory and growth of the distance function",
     "mazes": "contest mazes explored, beside flood fill",
     "maze_drives": "contest mazes driven by their true plan",
+    "maze_nodes": "the same by simulator and maze_planner, over DDS",
     "maze_camera": "mazes never seen before explored and run by one camera and odometry",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",
 }

@@ -39,13 +39,23 @@ MOST_S = 600.0
 
 @dataclass(frozen=True)
 class Drive:
-    """How a drive went: whether it arrived, walls touched, least room to them (m), seconds, metres."""
+    """How a drive went.
+
+    Attributes:
+        arrived: whether at the goal.
+        contacts: walls touched.
+        closest_m: least room to them.
+        time_s: simulated.
+        way_m: driven.
+        unanswered: pictures that no steering answered in time; through the nodes only.
+    """
 
     arrived: bool
     contacts: int
     closest_m: float
     time_s: float
     way_m: float
+    unanswered: int = 0
 
 
 def planner_settings(cell: float) -> dict[str, float]:

@@ -11,7 +11,8 @@ every reliable subscriber is waited for, so that the same seed gives the same dr
 a fast one. When no steering comes within `lockstep_timeout`, the vehicle goes on with its last command; it
 stops when that is older than `timeout` of simulated time.
 
-Otherwise simulated time runs with real time, or slower where pictures cannot be made fast enough.
+Otherwise simulated time runs with real time, or slower where pictures cannot be made fast enough. None is made while
+nobody listens to them.
 """
 
 from __future__ import annotations
@@ -278,13 +279,15 @@ class Simulator(VisionNode):
             self._say(sensed.head_joints(now, self._drive.camera))
         for said in self._teller.at(now, self._drive.state):
             self._say(said)
-        began = time.perf_counter()
-        picture = self._format.say(now, self._drive.picture())
-        self.diagnostics.processing_ms = 1e3 * (time.perf_counter() - began)
         self._awaited_ns, self._awaited_topics = now, {"steering"}
         if self._looks is not None and self._look_at_comes and self._looks.get_publisher_count():
             self._awaited_topics.add("look_at")
-        self._outputs[picture.topic].publish(encode(picture.message))
+        output = self._outputs[self._format.topic]
+        if output.get_subscription_count():
+            began = time.perf_counter()
+            picture = self._format.say(now, self._drive.picture())
+            self.diagnostics.processing_ms = 1e3 * (time.perf_counter() - began)
+            output.publish(encode(picture.message))
         self._pictures += 1
         self.diagnostics.answered += 1
 
