@@ -128,6 +128,23 @@ def test_a_map_of_one_cell() -> None:
     assert len(route.points) == 2
 
 
+def test_a_map_of_20_000_by_200_cells_that_grows() -> None:
+    cells = room(20_000, 200)
+    cells[1000::1000, :150] = cells[500::1000, 50:] = 100  # to and fro
+    seen = cells.copy()
+    seen[15_000:] = -1
+    navigator = going(seen, (5.0, 999.0))
+    hopeful = navigator.route(5.0, 1.0)
+    assert hopeful.reason == "leads over floor nobody has seen yet"
+    navigator.see_map(FloorMap(cells, CELL))
+    route = navigator.route(5.0, 1.0)
+    assert np.isinf(route.seen)
+    assert np.allclose(route.points[-1], (5.0, 999.0), atol=CELL)
+    assert len(route.points) == 2 + 2 * 39  # around the ends of 39 walls
+    places = FloorMap(cells, CELL).to_cells(route.points)
+    assert (np.diff(places[:, 0]) > 0).all()
+
+
 @pytest.mark.parametrize(
     ("cells", "words"),
     [
