@@ -2,9 +2,8 @@
 """Hears a map as it grows, where the robot is and where it shall be; says the way there, and how to steer along it.
 
 Modes, each by a service (std_srvs/Trigger) of its name or the parameter `mode`: `go` to the goal, `explore` what
-the map does not know yet, `hold`. Steering answers odometry, stamp by stamp. Without a way, and when odometry stops
-for `timeout`, the robot stands; it drives only over floor the map knows to be free. The service `enable`
-(std_srvs/SetBool) stops and releases it.
+the map does not know yet, `hold`. Steering answers odometry, stamp by stamp. Without a way the robot stands; it drives
+only over floor the map knows to be free. When else it tells the robot to stand still, is told in `ros/steering.py`.
 """
 
 from __future__ import annotations
@@ -12,23 +11,23 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
-from rclpy.clock import Clock
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 
 from robot_vision.control.pursuit import PathPursuit
 from robot_vision.planning import path as planning
 from robot_vision.planning.navigator import MODES, Mode, Navigator, Route
 from robot_vision.ros import maps, messages, qos
 from robot_vision.ros.diagnostics import Level
-from robot_vision.ros.node import VisionNode, stamp_ns
+from robot_vision.ros.node import stamp_ns
 from robot_vision.ros.parameters import Setting
 from robot_vision.ros.run import run_node
+from robot_vision.ros.steering import STEERING_SETTINGS, SteeringNode
 
 ROUTE_SETTINGS = (
     Setting("radius", 0.25, "of the robot: its way keeps so far from every wall, m", 0.0, 10.0),
@@ -56,41 +55,32 @@ MAPS = QoSProfile(
 )
 
 
-class MazePlannerNode(VisionNode):
+class MazePlannerNode(SteeringNode):
     """`map`, `odom` and `goal_pose` to `path`, `distance_field` and `steering`."""
 
     SETTINGS = (
         Setting("mode", "go", "go, explore or hold; the services of these names set it", choices=MODES),
         *ROUTE_SETTINGS,
         *DRIVE_SETTINGS,
-        Setting("enabled", True, "whether to steer; the service enable sets it"),
-        Setting("timeout", 0.5, "stand still after so long without odometry, s", 0.05, 60.0),
+        *STEERING_SETTINGS,
     )
+    STEERS_BY = "odometry"
+    ADVICE = "look what says odom"
 
     def __init__(self) -> None:
         super().__init__("maze_planner")
         self._navigator = Navigator()
         self._pursuit = PathPursuit()
-        self._enabled = True
         self._frame = ""
-        self._header: Header | None = None
-        self._drives = False
         self._told = -1
         self._map_is_new = False
         self._path = self.say(Path, "path", LASTING)
         self._field = self.say(Image, "distance_field", LASTING)
-        self._steering = self.say(TwistStamped, "steering", qos.ANSWER)
         self._maps = self.hear(OccupancyGrid, "map", self._hear_map, MAPS, required=True)
         self._goals = self.hear(PoseStamped, "goal_pose", self._hear_goal, qos.EVERY)
         self.hear(Odometry, "odom", self._hear_odometry, qos.SENSOR, required=True, picture=True)
         for mode in MODES:
             self.create_service(Trigger, mode, self._mode_service(mode))
-        for name in ("enable", "~/enable"):
-            self.create_service(SetBool, name, self._enable)
-        self._watch = self.create_timer(
-            self.settings["timeout"], self._stop_after_silence, clock=self._watch_clock()
-        )
-        self._watch.cancel()
         self.use_settings()
 
     def warm_up(self) -> None:
@@ -105,28 +95,20 @@ class MazePlannerNode(VisionNode):
         self._navigator.use(**route)
         for name, value in drive.items():
             setattr(self._pursuit, name, value)
-        self._watch.timer_period_ns = round(1e9 * values["timeout"])
-        mode, enabled = self._navigator.mode, self._enabled
+        held = self._navigator.mode == "hold"
         self._navigator.set_mode(values["mode"])
-        self._enabled = values["enabled"]
-        if enabled and not self._enabled:
-            self._stand_still()
-            self.diagnostics.report(Level.WARN, "disabled", "call the service enable with true")
-        elif mode != values["mode"] and values["mode"] == "hold":
-            self._stand_still()
+        super().configure(values)
+        if self._enabled and not held and values["mode"] == "hold":
+            self.stand_still()
             self.diagnostics.report(Level.OK, "holds", "call the service go or explore")
 
     def on_clock_jump_back(self) -> None:
         """Forget the last command; map and goal stay, they are no matter of time."""
         self._pursuit.reset()
 
-    def stop(self) -> None:
-        """Leave no robot driving by the last word of a node that is gone; a replay drives none."""
-        if self._drives and not self.get_parameter("use_sim_time").value:
-            self._stand_still()
-
-    def _watch_clock(self) -> Clock:
-        return self.get_clock() if self.get_parameter("use_sim_time").value else self.steady_clock
+    def reset_steering(self) -> None:
+        """Begin from standing."""
+        self._pursuit.reset()
 
     def _hear_map(self, message: OccupancyGrid) -> None:
         floor = maps.floor_map_from_message(message)
@@ -146,26 +128,31 @@ class MazePlannerNode(VisionNode):
         self.catch_up(self._maps)
         self.catch_up(self._goals)
         self._header = message.header
-        self._watch.reset()
         if not self._enabled or self._navigator.mode == "hold":
             return
+        self._watch.reset()
         if self._frame:
             self._check_frame(message.header)
+        old = self.refusal_of_age(stamp_ns(message.header.stamp))
+        if old:
+            self.stand_still()
+            self.diagnostics.report(Level.WARN, f"stands still: {old}", self.ADVICE)
+            return
         route = self._navigator.route(x, y)
         self._tell(route, message.header)
         if not len(route.points):
-            self._stand_still()
+            self.stand_still()
             level, state = (Level.OK, "") if route.done else (Level.WARN, "stands still: ")
             self.diagnostics.report(level, f"{state}{route.reason}", route.advice)
             return
         if self._navigator.has_arrived(x, y):
-            self._stand_still()
+            self.stand_still()
             self.diagnostics.report(Level.OK, "arrived")
             return
         steering = self._pursuit.update(
             route.points, (x, y, yaw), 1e-9 * stamp_ns(message.header.stamp), route.seen
         )
-        self._say(steering.speed, steering.turn_rate)
+        self.obey(steering.speed, steering.turn_rate)
         self.answered(message.header.stamp, began)
         if steering.speed == 0.0 and steering.turn_rate == 0.0 and route.reason:
             advice = "let the map grow, or give another goal"
@@ -175,7 +162,7 @@ class MazePlannerNode(VisionNode):
 
     def _check_frame(self, header: Header) -> None:
         if self._frame and header.frame_id and header.frame_id != self._frame:
-            self._stand_still()
+            self.stand_still()
             raise messages.MessageError(
                 f"it is in the frame {header.frame_id}, the map in {self._frame}: nothing joins the two; "
                 "let both be said in one frame"
@@ -195,25 +182,6 @@ class MazePlannerNode(VisionNode):
                 self._field.publish(maps.field_to_message(own, field))
         self._map_is_new = False
 
-    def _stop_after_silence(self) -> None:
-        self._watch.cancel()
-        self._stand_still()
-        self.diagnostics.report(
-            Level.WARN,
-            f"stands still: no odometry for {self.settings['timeout']:g} s",
-            "look what says odom",
-        )
-
-    def _stand_still(self) -> None:
-        self._pursuit.reset()
-        self._say(0.0, 0.0)
-
-    def _say(self, speed: float, turn_rate: float) -> None:
-        if self._header is None:
-            return
-        self._drives = speed != 0.0 or turn_rate != 0.0
-        self._steering.publish(messages.steering_to_message(self._header, speed, turn_rate))
-
     def _mode_service(self, mode: Mode) -> Any:
         def change(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             result = self.set_parameters([Parameter("mode", value=mode)])[0]
@@ -222,12 +190,6 @@ class MazePlannerNode(VisionNode):
             return response
 
         return change
-
-    def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        result = self.set_parameters([Parameter("enabled", value=request.data)])[0]
-        response.success = result.successful
-        response.message = result.reason or ("steers" if request.data else "stands still")
-        return response
 
 
 def main(args: list[str] | None = None) -> None:

@@ -26,7 +26,7 @@ from robot_vision.ros.parameters import Setting
 STEERING_SETTINGS = (
     Setting("enabled", True, "whether to steer; the service enable sets it"),
     Setting("timeout", 0.5, "stand still after so long without anything to steer by, s", 0.05, 60.0),
-    Setting("max_age", 0.0, "oldest picture to steer by, s; 0: any, as for replays", 0.0, 60.0),
+    Setting("max_age", 0.0, "oldest input to steer by, s; 0: any, as for replays", 0.0, 60.0),
 )
 
 
@@ -87,10 +87,10 @@ class SteeringNode(VisionNode):
         self._steering.publish(messages.steering_to_message(self._header, speed, turn_rate))
 
     def refusal_of_age(self, now_ns: int) -> str:
-        """Say why a picture with this stamp is none to steer by; empty when it is."""
+        """Say why what has this stamp is nothing to steer by; empty when it is."""
         age_s = 1e-9 * (self.get_clock().now().nanoseconds - now_ns)
         if self._max_age_s and age_s > self._max_age_s:
-            return f"the picture is {age_s:.2f} s old"
+            return f"the {self.STEERS_BY} is {age_s:.2f} s old"
         return ""
 
     def stop(self) -> None:

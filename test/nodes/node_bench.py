@@ -60,6 +60,10 @@ class NodeBench:
         """Advertise a topic the node hears."""
         self._publishers[topic] = self.node.create_publisher(kind, topic, qos)
 
+    def falls_silent(self, topic: str) -> None:
+        """Advertise a topic no longer."""
+        self.node.destroy_publisher(self._publishers.pop(topic))
+
     def hears(self, kind: type, topic: str) -> None:
         """Collect what the node says on a topic."""
         said = self._said[topic] = []

@@ -318,6 +318,16 @@ def test_disabled_it_stands_and_enabled_it_goes_on(bench: NodeBench) -> None:
     assert not is_still(stand(bench, 1.05, 1.05))
 
 
+def test_odometry_that_is_too_old_is_not_steered_by(bench: NodeBench) -> None:
+    see(bench, room())
+    aim(bench, 5.05, 1.05)
+    assert bench.set_parameter("max_age", 2.0).successful  # the stamps here are of 1970
+    assert is_still(stand(bench, 1.05, 1.05))
+    says(bench, "stands still: the odometry is ")
+    assert bench.set_parameter("max_age", 0.0).successful
+    assert not is_still(stand(bench, 1.05, 1.05))
+
+
 def test_settings_change_live_and_nonsense_is_refused(bench: NodeBench) -> None:
     assert bench.set_parameter("speed", 0.2).successful
     refused = bench.set_parameter("radius", -1.0)
