@@ -38,6 +38,7 @@ BENCHMARKS = {
     "latency": "from picture to steering at 30 Hz, processes over DDS",
     "paths": "ways planned on the maps of MovingAI",
     "fields": "speed, memory and growth of the distance function",
+    "first_call": "what the first distance function of a process costs",
     "mazes": "contest mazes explored, beside flood fill",
     "maze_drives": "contest mazes driven by their true plan",
     "maze_nodes": "the same by simulator and maze_planner, over DDS",
