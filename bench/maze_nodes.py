@@ -176,14 +176,7 @@ def run(quick: bool, names: tuple[str, ...] = MAZES) -> list[Table]:
 
 def table(drives: dict[str, Drive]) -> Table:
     """The drives, one beneath the other."""
-    columns = [
-        "goal reached",
-        "walls touched",
-        "least room, mm",
-        "driven, m",
-        "m/s",
-        "without steering in time",
-    ]
+    columns = ["at goal", "touched", "room, mm", "way, m", "m/s", "unanswered"]
     rows = [
         Row(
             name,
