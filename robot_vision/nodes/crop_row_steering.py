@@ -141,8 +141,8 @@ class CropRowSteeringNode(SteeringNode):
             setattr(self._sprayer, name, value)
 
     def warm_up(self) -> None:
-        """Load the compiled kernels."""
-        self._tracker.detector.warm_up()
+        """Load the compiled kernels and what the filter stands on."""
+        self._tracker.warm_up()
         self._plant_map.segmenter.warm_up()
 
     def on_clock_jump_back(self) -> None:

@@ -9,15 +9,18 @@ wall's foot agree in it, and the middle between the two feet is the middle of th
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 
 from robot_vision.perception.attitude import Attitude
 from robot_vision.perception.floor_lines import FloorEvidence, floor_evidence
 from robot_vision.perception.segments import LineSegments
 from robot_vision.perception.vanishing import VanishingPoints
+
+if TYPE_CHECKING:
+    from filterpy.kalman import KalmanFilter
 
 Array = NDArray[np.float64]
 
@@ -202,6 +205,8 @@ class LaneFilter:
 
     def _begin(self, feet: dict[int, _Foot | None]) -> bool:
         """Take up a lane between two feet: at once where both are seen well, else once they have been confirmed."""
+        from filterpy.kalman import KalmanFilter  # slow to import: it brings scipy.stats
+
         left, right = feet[1], feet[-1]
         if left is None or right is None or not self.narrowest <= left.place - right.place <= self.widest:
             self._hoped = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -115,7 +116,8 @@ class WayEstimator:
         self.road.narrowest, self.road.widest = narrowest, widest
 
     def warm_up(self) -> None:
-        """Load the compiled kernels."""
+        """Load the compiled kernels and what the filters stand on."""
+        import_module("filterpy.kalman")
         self.corridor.estimator.warm_up()
 
     def reset(self) -> None:

@@ -10,10 +10,13 @@ promises after ten pictures what only ten fields could hold.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from filterpy.kalman import KalmanFilter
 
 Array = NDArray[np.float64]
 
@@ -154,6 +157,8 @@ class RowFilter:
         return seen
 
     def _begin(self, measured: Array, covariance: Array) -> None:
+        from filterpy.kalman import KalmanFilter  # slow to import: it brings scipy.stats
+
         f = KalmanFilter(dim_x=_SIZE, dim_z=3)
         f.x = np.zeros((_SIZE, 1))
         f.x[:3, 0] = measured

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +107,11 @@ class RowTracker:
         for name in ("coherence", "cover"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} must lie in [0, 1), not {getattr(self, name)}")
+
+    def warm_up(self) -> None:
+        """Load the compiled kernels and what the filter stands on."""
+        import_module("filterpy.kalman")
+        self.detector.warm_up()
 
     def reset(self) -> None:
         """Forget everything earlier pictures told."""

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
@@ -82,6 +81,8 @@ class RoadFilter:
         camera: Camera,
         lean: float,
     ) -> None:
+        from filterpy.kalman import KalmanFilter  # slow to import: it brings scipy.stats
+
         self._alignment, self._motion = alignment, motion
         self._upright, self._lean = np.array([camera.roll, camera.pitch]), lean
         count = len(alignment.knots)

@@ -7,7 +7,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 
 from robot_vision.geometry.sphere import cross, local_coordinates, retract, tangent_basis
@@ -49,6 +48,8 @@ class Track:
     """
 
     def __init__(self, number: int, direction: Array, covariance: Array, role: Role, agility: float) -> None:
+        from filterpy.kalman import KalmanFilter  # slow to import: it brings scipy.stats
+
         self.number = number
         self.direction = direction.copy()
         self.role = role
