@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 from bench.row_drives import RATE, moved, recorded_pictures
 from robot_vision.geometry import Camera
 from robot_vision.mapping.plant_map import PlantMap
-from robot_vision.mapping.plants import PlantKind, Plants
+from robot_vision.mapping.plants import Plants
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.tracker import RowEstimate, RowTracker
 from robot_vision.planning.sprayer import Spray, SprayPlanner
@@ -232,7 +232,7 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
     for lane, begin, end in machine.jets:
         jets[lane, (seconds >= begin) & (seconds <= end)] = True
     radii, weed = truth.radii[near], truth.weed[near]
-    clear = _clear_weeds(ahead, left, crossing, radii, weed, planner)
+    clear, middle = _clear_weeds(ahead, left, crossing, radii, weed, planner)
     for n in np.flatnonzero(passed):
         if weed[n]:
             lane = int((left[n, crossing[n]] + 0.5 * planner.lanes * planner.width) / planner.width)
@@ -241,6 +241,8 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
             counts["sprayed"] += hit
             counts["clear"] += bool(clear[n])
             counts["clear sprayed"] += hit and bool(clear[n])
+            counts["middle clear"] += bool(middle[n])
+            counts["middle sprayed"] += hit and bool(middle[n])
         else:
             around = np.flatnonzero(np.abs(ahead[n]) < radii[n])
             aside = np.abs(left[n, around][None] - planner.middles[:, None]) - 0.5 * planner.width
@@ -251,27 +253,19 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
 
 def _clear_weeds(
     ahead: Array, left: Array, crossing: NDArray[np.intp], radii: Array, weed: Mask, planner: SprayPlanner
-) -> Mask:
-    """Weeds that who knew all could spray and keep the safety distance: by the planner itself, told the truth."""
-    clear = np.zeros(len(weed), np.bool_)
-    kinds = np.where(weed, PlantKind.WEED, PlantKind.CROP).astype(np.uint8)
+) -> tuple[Mask, Mask]:
+    """Weeds that who knew all could spray whole, or at least in the middle, and keep the safety distance.
+
+    The margin before and behind is in both. That is told from the truth alone: what is planned has no say.
+    """
+    whole, middle = np.zeros((2, len(weed)), np.bool_)
     for n in np.flatnonzero(weed):
-        now = np.column_stack([ahead[:, crossing[n]] + planner.boom_x, left[:, crossing[n]]])
-        close = np.flatnonzero(np.hypot(*(now - now[n]).T) < 0.6)
-        count = len(close)
-        true = Plants(
-            close.astype(np.uint32),
-            now[close],
-            np.zeros(count),
-            np.pi * radii[close] ** 2,
-            np.full(count, 9),
-            np.zeros((count, 2, 2)),
-            np.zeros(count),
-            kinds[close],
-            now[close],
-        )
-        instant = SprayPlanner(
-            planner.lanes, planner.width, planner.boom_x, 0.0, planner.safety, planner.margin
-        )
-        clear[n] = n in instant.plan(true, 1.0).weeds.ids
-    return clear
+        x, y = ahead[:, crossing[n]], left[:, crossing[n]]
+        crop = np.flatnonzero(~weed & (np.hypot(x - x[n], y - y[n]) < 0.6))
+        lanes = planner.middles[np.abs(planner.middles - y[n]) <= 0.5 * planner.width + 1e-9]
+        aside = np.maximum(np.abs(y[crop, None] - lanes) - 0.5 * planner.width, 0.0)
+        for clear, half in ((whole, radii[n] + planner.margin), (middle, planner.margin)):
+            away = np.maximum(np.abs(x[crop] - x[n]) - half, 0.0)[:, None]
+            kept = np.hypot(away, aside) >= radii[crop, None] + planner.safety
+            clear[n] = kept.all(axis=0).any()
+    return whole, middle
