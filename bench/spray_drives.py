@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from bench.row_drives import RATE, moved, recorded_pictures
+from bench.spray_misses import cause_of_miss
 from robot_vision.geometry import Camera
 from robot_vision.mapping.plant_map import PlantMap
 from robot_vision.mapping.plants import Plants
@@ -36,6 +37,8 @@ SAME_M = 0.04
 """A plant of the map is a true one when it is this near, or nearer than the radius of the true one."""
 FEWEST_PICTURES = 8
 """In which a plant must be in view to count as one that came and went."""
+BEFORE_S = 0.3
+"""Before a missed weed came under the boom, it is asked why."""
 STEP = STEPS_PER_SECOND // 200
 """Of the motion, between two looks at where the jets are."""
 
@@ -118,6 +121,7 @@ def _truth(world: World) -> TruePlants:
 def tend(out: Outing, plant_map: PlantMap, planner: SprayPlanner, tally: Tally) -> None:
     """Follow the plants of a drive, spray, and count."""
     follower, machine = _Follower(out, tally), _Machine(planner)
+    said: list[tuple[Plants, Spray]] = []
     for number, seen in enumerate(out.seen):
         began = time.process_time()
         plants = plant_map.update(seen.picture, out.camera, seen.rows, SPACING_M, seen.motion)
@@ -125,8 +129,9 @@ def tend(out: Outing, plant_map: PlantMap, planner: SprayPlanner, tally: Tally) 
         tally.seconds.append(time.process_time() - began)
         follower.look(seen.state, plants)
         machine.hear(number / RATE, spray, seen.motion.speed or 0.0)
+        said.append((plants, spray))
     follower.judge()
-    _judge_jets(out, machine, planner, tally)
+    _judge_jets(out, machine, said, planner, tally)
 
 
 class _Follower:
@@ -212,7 +217,9 @@ class _Machine:
                 self.jets.append((lane, begin + self._planner.latency, end + self._planner.latency))
 
 
-def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Tally) -> None:
+def _judge_jets(
+    out: Outing, machine: _Machine, said: list[tuple[Plants, Spray]], planner: SprayPlanner, tally: Tally
+) -> None:
     """Where the boom truly was while the valves were open, and what stood there."""
     drive, truth, counts = out.drive, out.truth, tally.counts
     steps = np.arange(0, len(out.seen) * STEPS_PER_SECOND // RATE, STEP)
@@ -241,6 +248,11 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
             counts["sprayed"] += hit
             counts["clear"] += bool(clear[n])
             counts["clear sprayed"] += hit and bool(clear[n])
+            if clear[n] and not hit:
+                number = max(int((seconds[crossing[n]] - BEFORE_S) * RATE), 0)
+                state = out.seen[number].state
+                place = truth.from_robot(state.x, state.y, state.yaw)[near[n]]
+                counts[cause_of_miss(place, max(SAME_M, radii[n]), *said[number])] += 1
             counts["middle clear"] += bool(middle[n])
             counts["middle sprayed"] += hit and bool(middle[n])
         else:
