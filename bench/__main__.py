@@ -110,8 +110,8 @@ def seeds_of(text: str) -> tuple[int, ...]:
     """
     seeds: list[int] = []
     for part in text.split(","):
-        first, _, last = part.partition("-")
-        if not (first.isdecimal() and (last or first).isdecimal()):
+        first, dash, last = part.partition("-")
+        if not (first.isdecimal() and (last if dash else first).isdecimal()):
             raise argparse.ArgumentTypeError(f"seeds look like 6-10 or 3,5, not {text!r}")
         seeds += range(int(first), int(last or first) + 1)
     if not seeds:
