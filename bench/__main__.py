@@ -45,6 +45,8 @@ BENCHMARKS = {
     "maze_camera": "mazes never seen before explored and run by one camera and odometry",
     "overload": "the same at 60 Hz: what is skipped, how old what is steered by",
 }
+SEEDED = ("field", "spray", "field_loop")
+"""Those whose seeds can be chosen, so that many drives may be driven in parts."""
 OUTPUT = ROOT / "out" / "bench.json"
 
 
@@ -59,7 +61,8 @@ def main(arguments: list[str] | None = None) -> None:
     for name in names:
         try:
             with console.status(f"{name}: {BENCHMARKS[name]}"):
-                tables = import_module(f"bench.{name}").run(options.quick)
+                run = import_module(f"bench.{name}").run
+                tables = run(options.quick, options.seeds) if name in SEEDED else run(options.quick)
         except MissingSetError as missing:
             console.print(f"[yellow]{name} is skipped:[/] {escape(str(missing))}")
             skipped.append(name)
@@ -86,12 +89,36 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--quick", action="store_true", help="fewer pictures, one run: a look, no measurement"
     )
+    parser.add_argument(
+        "--seeds", type=seeds_of, help=f"such as 6-10 or 3,5: drive these ({', '.join(SEEDED)})"
+    )
     parser.add_argument("--out", type=Path, default=OUTPUT, help="the JSON file to write [out/bench.json]")
     options = parser.parse_args(arguments)
     for name in options.benchmarks:
         if name not in BENCHMARKS:
             parser.error(f"there is no benchmark {name!r}; choose from {', '.join(BENCHMARKS)}")
+        if options.seeds and name not in SEEDED:
+            parser.error(f"the seeds of {name} are its own; --seeds is for {', '.join(SEEDED)}")
+    if options.seeds and not options.benchmarks:
+        parser.error(f"--seeds wants to know of what: {', '.join(SEEDED)}")
     return options
+
+
+def seeds_of(text: str) -> tuple[int, ...]:
+    """Seeds named on the command line: `6-10`, `3,5` or both.
+
+    Raises:
+        argparse.ArgumentTypeError: saying what seeds look like.
+    """
+    seeds: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.partition("-")
+        if not (first.isdecimal() and (last if dash else first).isdecimal()):
+            raise argparse.ArgumentTypeError(f"seeds look like 6-10 or 3,5, not {text!r}")
+        seeds += range(int(first), int(last or first) + 1)
+    if not seeds:
+        raise argparse.ArgumentTypeError(f"there is no seed in {text!r}")
+    return tuple(dict.fromkeys(seeds))
 
 
 def _machine() -> dict[str, Any]:

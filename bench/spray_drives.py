@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from bench.row_drives import RATE, moved, recorded_pictures
+from bench.spray_misses import cause_of_miss
 from robot_vision.geometry import Camera
 from robot_vision.mapping.plant_map import PlantMap
-from robot_vision.mapping.plants import PlantKind, Plants
+from robot_vision.mapping.plants import Plants
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.tracker import RowEstimate, RowTracker
 from robot_vision.planning.sprayer import Spray, SprayPlanner
@@ -36,6 +37,8 @@ SAME_M = 0.04
 """A plant of the map is a true one when it is this near, or nearer than the radius of the true one."""
 FEWEST_PICTURES = 8
 """In which a plant must be in view to count as one that came and went."""
+BEFORE_S = 0.3
+"""Before a missed weed came under the boom, it is asked why."""
 STEP = STEPS_PER_SECOND // 200
 """Of the motion, between two looks at where the jets are."""
 
@@ -118,6 +121,7 @@ def _truth(world: World) -> TruePlants:
 def tend(out: Outing, plant_map: PlantMap, planner: SprayPlanner, tally: Tally) -> None:
     """Follow the plants of a drive, spray, and count."""
     follower, machine = _Follower(out, tally), _Machine(planner)
+    said: list[tuple[Plants, Spray]] = []
     for number, seen in enumerate(out.seen):
         began = time.process_time()
         plants = plant_map.update(seen.picture, out.camera, seen.rows, SPACING_M, seen.motion)
@@ -125,8 +129,9 @@ def tend(out: Outing, plant_map: PlantMap, planner: SprayPlanner, tally: Tally) 
         tally.seconds.append(time.process_time() - began)
         follower.look(seen.state, plants)
         machine.hear(number / RATE, spray, seen.motion.speed or 0.0)
+        said.append((plants, spray))
     follower.judge()
-    _judge_jets(out, machine, planner, tally)
+    _judge_jets(out, machine, said, planner, tally)
 
 
 class _Follower:
@@ -212,7 +217,9 @@ class _Machine:
                 self.jets.append((lane, begin + self._planner.latency, end + self._planner.latency))
 
 
-def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Tally) -> None:
+def _judge_jets(
+    out: Outing, machine: _Machine, said: list[tuple[Plants, Spray]], planner: SprayPlanner, tally: Tally
+) -> None:
     """Where the boom truly was while the valves were open, and what stood there."""
     drive, truth, counts = out.drive, out.truth, tally.counts
     steps = np.arange(0, len(out.seen) * STEPS_PER_SECOND // RATE, STEP)
@@ -232,7 +239,7 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
     for lane, begin, end in machine.jets:
         jets[lane, (seconds >= begin) & (seconds <= end)] = True
     radii, weed = truth.radii[near], truth.weed[near]
-    clear = _clear_weeds(ahead, left, crossing, radii, weed, planner)
+    clear, middle = _clear_weeds(ahead, left, crossing, radii, weed, planner)
     for n in np.flatnonzero(passed):
         if weed[n]:
             lane = int((left[n, crossing[n]] + 0.5 * planner.lanes * planner.width) / planner.width)
@@ -241,6 +248,13 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
             counts["sprayed"] += hit
             counts["clear"] += bool(clear[n])
             counts["clear sprayed"] += hit and bool(clear[n])
+            if clear[n] and not hit:
+                number = max(int((seconds[crossing[n]] - BEFORE_S) * RATE), 0)
+                state = out.seen[number].state
+                place = truth.from_robot(state.x, state.y, state.yaw)[near[n]]
+                counts[cause_of_miss(place, max(SAME_M, radii[n]), *said[number])] += 1
+            counts["middle clear"] += bool(middle[n])
+            counts["middle sprayed"] += hit and bool(middle[n])
         else:
             around = np.flatnonzero(np.abs(ahead[n]) < radii[n])
             aside = np.abs(left[n, around][None] - planner.middles[:, None]) - 0.5 * planner.width
@@ -251,27 +265,19 @@ def _judge_jets(out: Outing, machine: _Machine, planner: SprayPlanner, tally: Ta
 
 def _clear_weeds(
     ahead: Array, left: Array, crossing: NDArray[np.intp], radii: Array, weed: Mask, planner: SprayPlanner
-) -> Mask:
-    """Weeds that who knew all could spray and keep the safety distance: by the planner itself, told the truth."""
-    clear = np.zeros(len(weed), np.bool_)
-    kinds = np.where(weed, PlantKind.WEED, PlantKind.CROP).astype(np.uint8)
+) -> tuple[Mask, Mask]:
+    """Weeds that who knew all could spray whole, or at least in the middle, and keep the safety distance.
+
+    The margin before and behind is in both. That is told from the truth alone: what is planned has no say.
+    """
+    whole, middle = np.zeros((2, len(weed)), np.bool_)
     for n in np.flatnonzero(weed):
-        now = np.column_stack([ahead[:, crossing[n]] + planner.boom_x, left[:, crossing[n]]])
-        close = np.flatnonzero(np.hypot(*(now - now[n]).T) < 0.6)
-        count = len(close)
-        true = Plants(
-            close.astype(np.uint32),
-            now[close],
-            np.zeros(count),
-            np.pi * radii[close] ** 2,
-            np.full(count, 9),
-            np.zeros((count, 2, 2)),
-            np.zeros(count),
-            kinds[close],
-            now[close],
-        )
-        instant = SprayPlanner(
-            planner.lanes, planner.width, planner.boom_x, 0.0, planner.safety, planner.margin
-        )
-        clear[n] = n in instant.plan(true, 1.0).weeds.ids
-    return clear
+        x, y = ahead[:, crossing[n]], left[:, crossing[n]]
+        crop = np.flatnonzero(~weed & (np.hypot(x - x[n], y - y[n]) < 0.6))
+        lanes = planner.middles[np.abs(planner.middles - y[n]) <= 0.5 * planner.width + 1e-9]
+        aside = np.maximum(np.abs(y[crop, None] - lanes) - 0.5 * planner.width, 0.0)
+        for clear, half in ((whole, radii[n] + planner.margin), (middle, planner.margin)):
+            away = np.maximum(np.abs(x[crop] - x[n]) - half, 0.0)[:, None]
+            kept = np.hypot(away, aside) >= radii[crop, None] + planner.safety
+            clear[n] = kept.all(axis=0).any()
+    return whole, middle

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
+from robot_vision.mapping.plant_errors import common_lean, other_rows, pose_noise, stem_noise
 from robot_vision.mapping.plant_kinds import PlantJudge, in_rows
 from robot_vision.mapping.plant_matching import blob_noise, look_for, matched, shift_noise
-from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, common_shift
+from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, by_lean, common_shift
 from robot_vision.mapping.plant_tracks import KNOWN_AGE, PlantTracks, Stature
 from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
@@ -38,6 +39,9 @@ Mask = NDArray[np.bool_]
 
 #: Standard deviation of roll and pitch where no rows tell them, rad.
 _UNSEEN_LEAN = 0.02
+#: Where the crop closes its own leaves stand out: a weed has been shown by so many pictures, as tips of leaves come and
+#: go, and is smaller than this share of the radius of a usual plant, as whole branches do not.
+_SURE_AGE, _SMALL = 5, 0.35
 #: Share of a picture's word on how large plants are.
 _SLOWLY = 0.1
 #: Difference in the logarithm of the area that doubles the variance of a place.
@@ -84,7 +88,11 @@ class PlantMap:
     _lean: Lean = field(default=Lean(), init=False, repr=False, compare=False)
     _tall: float = field(default=0.6, init=False, repr=False, compare=False)
     _blind: bool = field(default=False, init=False, repr=False, compare=False)
+    _closes: bool = field(default=False, init=False, repr=False, compare=False)
     _height: float = field(default=1.0, init=False, repr=False, compare=False)
+    _lean_error: Array = field(
+        default_factory=lambda: np.zeros((2, 2)), init=False, repr=False, compare=False
+    )
     _sigmas: Array = field(default_factory=lambda: np.full(6, 1e-3), init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -122,6 +130,7 @@ class PlantMap:
         chord, course = way * np.sinc(turn / 2 / np.pi), self.pose.yaw + turn / 2
         x, y, yaw = self.pose
         self.pose = Pose(x + chord * np.cos(course), y + chord * np.sin(course), yaw + turn)
+        self.tracks.shared *= other_rows(way)
         unsure = np.hypot(0.003, self.slip * way)
         self._sigmas = np.array(
             [unsure, unsure, np.hypot(0.001, self.slip * turn + 0.003 * way), self.lean, self.lean, 0.004]
@@ -156,8 +165,11 @@ class PlantMap:
     def _see(self, picture: Picture, camera: Camera, rows: RowEstimate, spacing: float) -> None:
         assert camera.height_m is not None
         lean, sigma = Lean(height=self._lean.height), _UNSEEN_LEAN
+        self._lean_error = np.zeros((2, 2))  # all that is not known of it is new in this picture
         if rows.rows is not None:
             lean, sigma = Lean(*rows.rows.values[ROLL:].tolist()), self.lean
+            claimed = rows.rows.covariance[ROLL : PITCH + 1, ROLL : PITCH + 1]
+            self._lean_error = common_lean(claimed, self.lean, 1.0 - float(np.exp(lean.height)))
         self._lean = lean
         self._sigmas[[ROLL, PITCH]] = sigma
         mask = self.mask.of(picture)
@@ -172,6 +184,7 @@ class PlantMap:
                 self.radius = (
                     radius if self.radius is None else self.radius + _SLOWLY * (radius - self.radius)
                 )
+        self._closes = window.closes
         self.see(window, camera, lean)
 
     def _told(self, lane: LaneHeading | None, spacing: float) -> Plants:
@@ -182,8 +195,13 @@ class PlantMap:
         to_base = np.array([[cosine, sine], [-sine, cosine]])
         field_places = tracks.states[known, :2]
         places = (field_places - (self.pose.x, self.pose.y)) @ to_base.T
-        covariance = np.asarray(to_base @ tracks.covariances[known, :2, :2] @ to_base.T)
         log_areas = tracks.log_areas[known]
+        covariance = np.asarray(to_base @ tracks.covariances[known, :2, :2] @ to_base.T)
+        radii = np.sqrt(np.exp(log_areas) / np.pi)
+        large = radii > _SMALL * (self.radius or np.inf)
+        covariance += stem_noise(radii, large & self._closes)
+        if self.shift is not None:
+            covariance += pose_noise(places, self.shift)
         weed = np.full(len(places), np.nan)
         if lane is not None:
             weed = self.judge.judge(
@@ -191,6 +209,8 @@ class PlantMap:
             )
         kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
         kinds[weed > self.sure] = PlantKind.WEED
+        if self._closes:
+            kinds[large | (tracks.ages[known] < _SURE_AGE)] = PlantKind.UNSURE
         kinds[weed < 0.5] = PlantKind.CROP
         return Plants(
             tracks.ids[known],
@@ -225,14 +245,22 @@ class PlantMap:
         # a blob larger or smaller than its plant has something of another, or lacks something
         size = np.log(blobs.areas[theirs]) - tracks.log_areas[mine] + 2.0 * tracks.states[mine, 2]
         doubt = 1.0 + (size / _AS_LARGE) ** 2
-        tracks.correct(mine, seen[theirs], noise[theirs] * doubt[:, None, None], self.pose, camera.x_m)
+        common = height * by_lean(blobs.slopes) @ self._lean_error
+        tracks.correct(
+            mine,
+            seen[theirs],
+            noise[theirs] * doubt[:, None, None],
+            common[theirs],
+            self.pose,
+            camera.x_m,
+        )
         q = np.exp(tracks.states[mine, 2])
         tracks.see_areas(mine, blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2)
         alone = np.ones(len(tracks), bool)
         alone[mine] = False
         places = expected * (window.fall / height) + (camera.x_m, 0.0)
         look_for(tracks, alone, places, window)
-        self._begin(blobs, theirs, seen, noise, camera)
+        self._begin(blobs, theirs, seen, noise, common, camera)
         tracks.forget(self.pose, self.behind)
 
     def _shift(self, blobs: Blobs, camera: Camera) -> Shift:
@@ -270,7 +298,9 @@ class PlantMap:
         )
         return found
 
-    def _begin(self, blobs: Blobs, taken: Rows, seen: Array, noise: Array, camera: Camera) -> None:
+    def _begin(
+        self, blobs: Blobs, taken: Rows, seen: Array, noise: Array, common: Array, camera: Camera
+    ) -> None:
         """Begin with blobs that are no known plant."""
         assert camera.height_m is not None
         new = blobs.whole.copy()
@@ -286,6 +316,7 @@ class PlantMap:
                 self._next,
                 seen[new],
                 noise[new],
+                common[new],
                 blobs.areas[new] * np.exp(-2.0 * blobs.lean.height),
                 self.pose,
                 camera.x_m,

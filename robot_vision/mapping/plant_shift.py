@@ -35,7 +35,7 @@ class Shift:
 
     def straightened(self, slopes: Array) -> Array:
         """Slopes (N, 2) of sights, had the body leaned as it did."""
-        moved = slopes + np.einsum("nij,j->ni", _by_lean(slopes), self.values[ROLL : PITCH + 1])
+        moved = slopes + np.einsum("nij,j->ni", by_lean(slopes), self.values[ROLL : PITCH + 1])
         return np.asarray(np.exp(self.values[BOUNCE]) * moved)
 
 
@@ -59,7 +59,7 @@ def common_shift(
     jacobian[:, :, FORWARD : LEFT + 1] = np.eye(2)
     jacobian[:, 0, TURN] = -expected[:, 1]
     jacobian[:, 1, TURN] = expected[:, 0] + camera_x
-    jacobian[:, :, ROLL : PITCH + 1] = height * _by_lean(slopes)
+    jacobian[:, :, ROLL : PITCH + 1] = height * by_lean(slopes)
     jacobian[:, :, BOUNCE] = height * slopes
     jacobian = whitener @ jacobian
     surprise = (whitener @ (height * slopes - expected)[:, :, None])[:, :, 0]
@@ -73,7 +73,7 @@ def common_shift(
     return Shift(values, np.asarray(np.linalg.inv(information)))
 
 
-def _by_lean(slopes: Array) -> Array:
+def by_lean(slopes: Array) -> Array:
     """Derivatives (N, 2, 2) of slopes by roll and pitch of the body, rad.
 
     A sight (a, b, -1) turned by a small roll r and pitch p is (a - p, b + r, -1 + r b - p a).

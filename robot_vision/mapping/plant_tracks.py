@@ -4,6 +4,10 @@
 A plant's state is its place in the field (m) and the logarithm of the share q = 1 - h / H of the camera's height H
 that is above its middle: for a camera at c the sight to it falls by 1 while it goes (p - c) / (q H) over the ground,
 so that a tall plant, seen from afar and then from near by, tells its height and with it where its stem stands.
+
+What is wrong about the lean of the body is wrong about all plants, and for as long as the same rows tell it: more
+pictures do not average it out. Each plant therefore keeps how its errors go with that common one, which is
+considered and not estimated (Schmidt 1966).
 """
 
 from __future__ import annotations
@@ -57,6 +61,7 @@ class PlantTracks:
         ids: (N,) uint32.
         states: (N, 3) x and y in the field (m), logarithm of q.
         covariances: (N, 3, 3).
+        shared: (N, 3, 2) covariance of the error of the state with the common one, in standard deviations of that.
         log_areas: (N,) of m^2.
         ages: (N,) pictures that showed it.
         missed: (N,) pictures in a row that showed bare ground in its place.
@@ -66,6 +71,7 @@ class PlantTracks:
     ids: NDArray[np.uint32]
     states: Array
     covariances: Array
+    shared: Array
     log_areas: Array
     ages: NDArray[np.intp]
     missed: NDArray[np.intp]
@@ -82,6 +88,7 @@ class PlantTracks:
             np.zeros(0, np.uint32),
             np.zeros((0, 3)),
             np.zeros((0, 3, 3)),
+            np.zeros((0, 3, 2)),
             np.zeros(0),
             count,
             count.copy(),
@@ -115,26 +122,35 @@ class PlantTracks:
         jacobian[:, :, 2] = -seen
         return seen, jacobian
 
-    def correct(self, rows: NDArray[np.intp], seen: Array, noise: Array, pose: Pose, camera_x: float) -> None:
+    def correct(
+        self,
+        rows: NDArray[np.intp],
+        seen: Array,
+        noise: Array,
+        common: Array,
+        pose: Pose,
+        camera_x: float,
+    ) -> None:
         """Take in where plants were seen.
 
         Args:
             rows: (M,) of the plants.
             seen: (M, 2) as of `seen_from`.
-            noise: (M, 2, 2) of it.
+            noise: (M, 2, 2) of it, without the common error.
+            common: (M, 2, 2) what the common error does to it, m a standard deviation.
             pose: of the robot in the field.
             camera_x: of the camera ahead of base_link, m.
         """
         expected, jacobian = self.seen_from(pose, camera_x)
         expected, jacobian = expected[rows], jacobian[rows]
-        before = self.covariances[rows]
-        cross = before @ jacobian.transpose(0, 2, 1)
-        gain = cross @ np.linalg.inv(jacobian @ cross + noise)
+        before, shared = self.covariances[rows], self.shared[rows]
+        cross = before @ _turned(jacobian) + shared @ _turned(common)
+        surely = jacobian @ shared + common
+        gain = cross @ np.linalg.inv(jacobian @ cross + surely @ _turned(common) + noise)
         self.states[rows] += (gain @ (seen - expected)[:, :, None])[:, :, 0]
-        # Joseph's form, which stays positive
-        left = np.eye(3) - gain @ jacobian
-        after = left @ before @ left.transpose(0, 2, 1) + gain @ noise @ gain.transpose(0, 2, 1)
-        self.covariances[rows] = 0.5 * (after + after.transpose(0, 2, 1))
+        after = before - gain @ _turned(cross)
+        self.covariances[rows] = 0.5 * (after + _turned(after))
+        self.shared[rows] = shared - gain @ surely
 
     def see_areas(self, rows: NDArray[np.intp], areas: Array) -> None:
         """Take in how large plants (M,) are, m^2, and that they were seen."""
@@ -148,6 +164,7 @@ class PlantTracks:
         first_id: int,
         seen: Array,
         noise: Array,
+        common: Array,
         areas: Array,
         pose: Pose,
         camera_x: float,
@@ -159,7 +176,8 @@ class PlantTracks:
         Args:
             first_id: of them; the others follow.
             seen: (M, 2) as of `seen_from`, m.
-            noise: (M, 2, 2) of it.
+            noise: (M, 2, 2) of it, without the common error.
+            common: (M, 2, 2) what the common error does to it, m a standard deviation.
             areas: (M,) as they appear on the ground, m^2.
             pose: of the robot in the field.
             camera_x: of the camera ahead of base_link, m.
@@ -178,14 +196,18 @@ class PlantTracks:
         states[:, 2] = log_q
         slant = (seen * q[:, None]) @ to_field.T
         covariances = np.zeros((count, 3, 3))
+        noise = noise + common @ _turned(common)
         covariances[:, :2, :2] = q[:, None, None] ** 2 * (to_field @ noise @ to_field.T)
         covariances[:, :2, :2] += sigma[:, None, None] ** 2 * slant[:, :, None] * slant[:, None, :]
         covariances[:, :2, 2] = covariances[:, 2, :2] = sigma[:, None] ** 2 * slant
         covariances[:, 2, 2] = sigma**2
+        shared = np.zeros((count, 3, 2))
+        shared[:, :2] = -q[:, None, None] * (to_field @ common)
         fresh = PlantTracks(
             np.arange(first_id, first_id + count, dtype=np.uint32),
             states,
             covariances,
+            shared,
             np.log(areas * q**2),
             np.ones(count, np.intp),
             np.zeros(count, np.intp),
@@ -193,6 +215,11 @@ class PlantTracks:
         )
         for name in self.__dataclass_fields__:
             setattr(self, name, np.concatenate([getattr(self, name), getattr(fresh, name)]))
+
+
+def _turned(matrices: Array) -> Array:
+    """Transposes (N, j, i) of matrices (N, i, j)."""
+    return matrices.transpose(0, 2, 1)
 
 
 def _to_base(yaw: float) -> Array:

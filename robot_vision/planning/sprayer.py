@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 #: A nozzle is meant for a weed when its lane covers this share of the weed's radius about its middle, or so much, m.
 _AIM, _LEAST_AIM = 0.5, 0.008
+#: From what may be crop so many standard deviations of its place are kept as well.
+_CAUTION = 0.5
 #: Slower than this nobody can say when a weed comes under the nozzle, m/s.
 _SLOWEST = 0.05
 
@@ -35,7 +37,8 @@ class Spray:
     """What is to be sprayed from now on.
 
     Attributes:
-        weeds: (M,) plants to be sprayed; one that several lanes reach stands there several times.
+        weeds: (M,) what the jets are to reach; a weed of several lanes stands there several times. Where a jet over
+            all of it would come too near the crop, place and area are those of the part that is clear.
         lanes: (M,) nozzle of each, 0 the rightmost.
         times: (M,) s until the middle of the weed is under the jet, less the latency: when to open the valve.
         reason: in plain words why nothing is sprayed at all; empty when all is well.
@@ -116,31 +119,45 @@ class SprayPlanner:
         reached = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii
         reached &= plants.places[:, 0] > self.boom_x - plants.radii - self.margin - self.latency * speed
         weeds = np.flatnonzero((plants.kinds == PlantKind.WEED) & reached)
-        half = plants.radii[weeds] + self.margin
+        begin, end = self._clear(plants, weeds)
         ahead = plants.places[weeds, 0] - self.boom_x
-        times = ahead / speed - self.latency
-        in_time = times > -half / speed
+        in_time = ahead[:, None] + end > self.latency * speed
         aim = np.maximum(_AIM * plants.radii[weeds], _LEAST_AIM)
+        aim += np.sqrt(plants.covariance[weeds, 1, 1])
         across = np.abs(plants.places[weeds, 1, None] - self.middles[None, :])
         meant = across < 0.5 * self.width + aim[:, None]
-        open_lanes = meant & ~self._over_crop(plants, weeds, half)
+        open_lanes = meant & (begin <= -self.margin) & (end >= self.margin)
         # The lane over the middle of a weed must be among those that may open
-        hit = (open_lanes & (across <= 0.5 * self.width + 1e-9)).any(axis=1)
-        weed, lane = np.nonzero(open_lanes & (hit & in_time)[:, None])
+        hit = np.asarray((open_lanes & (across <= 0.5 * self.width + 1e-9)).any(axis=1))
+        weed, lane = np.nonzero(open_lanes & hit[:, None] & in_time)
         self._count(plants, _marked(plants, weeds[hit]), _marked(plants, weeds[meant.any(axis=1) & ~hit]))
-        return Spray(plants.take(weeds[weed]), lane, times[weed])
+        begin, end = begin[weed, lane], end[weed, lane]
+        parts = plants.take(weeds[weed])
+        parts.places[:, 0] += 0.5 * (begin + end)
+        parts.areas[:] = np.pi * (0.5 * (end - begin) - self.margin) ** 2
+        return Spray(parts, lane, (parts.places[:, 0] - self.boom_x) / speed - self.latency)
 
-    def _over_crop(self, plants: Plants, weeds: NDArray[np.intp], half: Array) -> NDArray[np.bool_]:
-        """Whether spraying each weed (M,) would reach the crop, or what may be crop, for each lane: (M, lanes)."""
+    def _clear(self, plants: Plants, weeds: NDArray[np.intp]) -> tuple[Array, Array]:
+        """The part of the way about each weed (M,) on which a jet of each lane keeps off what may be crop.
+
+        Returns:
+            Where it begins and ends ahead of the weed's middle, (M, lanes) each, m; the margin is in it. It begins
+            ahead of the middle, or ends behind it, where the middle itself is too near.
+        """
+        half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
         wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii + self.safety
         crop = np.flatnonzero((plants.kinds != PlantKind.WEED) & wide)
         if not len(crop) or not len(weeds):
-            return np.zeros((len(weeds), self.lanes), np.bool_)
-        away = np.abs(plants.places[weeds, None, 0] - plants.places[None, crop, 0]) - half[:, None]
+            return -half, half
         aside = np.abs(plants.places[crop, 1, None] - self.middles[None, :]) - 0.5 * self.width
-        reach = (plants.radii[crop] + self.safety)[None, :, None]
-        near = np.hypot(np.maximum(away, 0.0)[:, :, None], np.maximum(aside, 0.0)[None, :, :]) < reach
-        return np.asarray(near.any(axis=1))
+        unsure = np.linalg.det(plants.covariance[crop]) ** 0.25
+        reach = (plants.radii[crop] + self.safety + _CAUTION * unsure)[:, None]
+        near = aside < reach
+        chord = np.sqrt(np.maximum(reach**2 - np.maximum(aside, 0.0) ** 2, 0.0))
+        away = (plants.places[None, crop, 0] - plants.places[weeds, None, 0])[:, :, None]
+        behind = np.where(near & (away < 0.0), away + chord, -np.inf).max(axis=1)
+        before = np.where(near & (away >= 0.0), away - chord, np.inf).min(axis=1)
+        return np.maximum(-half, behind), np.minimum(half, before)
 
     def _count(self, plants: Plants, sprayed: NDArray[np.bool_], spared: NDArray[np.bool_]) -> None:
         """Note what becomes of plants ahead, and count those that the boom has passed since the last picture."""

@@ -78,11 +78,18 @@ def sown(
     )
 
 
-def rows_seen(pose: Pose, fit: bool = True) -> RowEstimate:
-    """What the tracker would say, the body taken to be upright; without `fit` only the lane is known."""
+def rows_seen(pose: Pose, fit: bool = True, lean: float = 1e-3) -> RowEstimate:
+    """What the tracker would say, the body taken to be upright; without `fit` only the lane is known.
+
+    Args:
+        pose: of the robot.
+        fit: whether rows are found.
+        lean: standard deviation claimed for roll and pitch, rad.
+    """
     lane = LaneHeading(pose.yaw, 1e-6, pose.y, 1e-6, SPACING, 0.0)
     rows = None
     if fit:
         values = np.array([pose.y, pose.yaw, 0.0, 0.0, 0.0, np.log(1.0 - TALL * CROP_RADIUS / HEIGHT)])
-        rows = RowsOnGround(values, 1e-6 * np.eye(6), SPACING, 0.8, 50)
+        variance = np.array([1e-6, 1e-6, 1e-6, lean**2, lean**2, 1e-6])
+        rows = RowsOnGround(values, np.diag(variance), SPACING, 0.8, 50)
     return RowEstimate(lane, "", fit, rows, None)

@@ -17,6 +17,8 @@ from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
 from robot_vision.perception.crop_rows.plant_blobs import Lean, PlantSegmenter
 from robot_vision.perception.crop_rows.row_filter import Motion
+from robot_vision.perception.crop_rows.sensitivity import PRESETS
+from robot_vision.perception.vegetation import LeafMask
 
 WAY = 0.12
 STILL = Motion(0.1, 0.0, 0.0)
@@ -89,6 +91,27 @@ def test_roll_and_pitch_of_two_degrees_are_taken_out_where_no_row_tells_them() -
     # 2 degrees of pitch alone move a plant 1.4 m ahead by 98 mm
     assert float(np.sqrt(np.mean(np.square(away)))) < 0.015
     assert np.mean([len(ids) == 1 for ids in numbers.values()]) > 0.95
+
+
+def test_places_are_as_sure_as_they_say_where_the_rows_tell_a_wrong_lean_for_metres() -> None:
+    random, sigma, kept = np.random.default_rng(9), math.radians(0.7), math.exp(-WAY / 1.5)
+    surprises = list[float]()
+    for seed in range(10, 13):
+        scene, plant_map, lean = sown(seed), PlantMap(), random.normal(0.0, sigma, 2)
+        for n in range(14):
+            pose, motion = at(n), Motion(0.1, WAY / 0.1, 0.0) if n else STILL
+            picture = scene.picture(pose, *lean)
+            lean = kept * lean + random.normal(0.0, sigma * math.sqrt(1.0 - kept**2), 2)
+            plants = plant_map.update(picture, CAMERA, rows_seen(pose, lean=sigma), SPACING, motion)
+            if n < 8:
+                continue
+            here = scene.seen_from(pose)
+            for true, row in same(scene, pose, plants, 0.04).items():
+                if -0.3 < here[true, 0] < 1.6:
+                    error = plants.places[row] - here[true]
+                    surprises.append(float(error @ np.linalg.solve(plants.covariance[row], error)))
+    # two degrees of freedom
+    assert 0.7 < np.mean(surprises) < 3.0
 
 
 def test_the_common_shift_is_found_from_the_sights() -> None:
@@ -183,6 +206,36 @@ def test_the_step_of_the_grid_and_a_weed_in_the_row_are_found() -> None:
     assert judge.found_step == pytest.approx(STEP, rel=0.02)
     assert weed[-1] > 5.0 * np.median(weed[:-1])
     assert (weed[:-1] < 0.5).mean() > 0.97
+
+
+def test_plants_and_weeds_are_told_in_the_near_infrared_as_in_colour() -> None:
+    scene, told = sown(5), dict[str, Plants]()
+    for name in ("colour", "mono8", "filtered"):
+        plant_map = PlantMap(mask=LeafMask(index="infrared" if name == "filtered" else "auto"))
+        for n in range(7):
+            picture, pose = scene.picture(at(n)), at(n)
+            grey = np.where(picture[..., 1] > picture[..., 2], 190, 100).astype(np.uint8)
+            if name != "colour":
+                picture = grey if name == "mono8" else np.repeat(grey[..., None], 3, axis=2)
+            motion = Motion(0.1, WAY / 0.1, 0.0) if n else STILL
+            told[name] = plant_map.update(picture, CAMERA, rows_seen(pose), SPACING, motion)
+    assert told["mono8"].ids.tolist() == told["filtered"].ids.tolist()
+    count = len(told["colour"])
+    assert count > 50
+    away = np.linalg.norm(told["colour"].places[:, None] - told["mono8"].places[None], axis=2)
+    nearest = away.argmin(axis=1)
+    alike = away[np.arange(count), nearest] < 0.015
+    assert alike.mean() > 0.95
+    assert (told["colour"].kinds == told["mono8"].kinds[nearest])[alike].mean() > 0.95
+
+
+def test_a_readier_preset_calls_more_plants_weeds() -> None:
+    scene, weeds = sown(6), []
+    for preset in PRESETS.values():
+        plants = driven(scene, PlantMap(sure=preset.sure), 6)[-1][1]
+        weeds.append(set(plants.ids[plants.kinds == PlantKind.WEED].tolist()))
+    assert weeds[0] <= weeds[1] <= weeds[2]
+    assert len(weeds[0]) > 10
 
 
 def test_touching_plants_are_cut_and_leaves_of_one_are_joined() -> None:

@@ -49,11 +49,41 @@ def test_a_weed_on_the_border_of_two_lanes_gets_both() -> None:
 
 
 @pytest.mark.parametrize("neighbour", [CROP, UNSURE])
-def test_a_weed_too_near_the_crop_is_spared(neighbour: PlantKind) -> None:
+def test_a_weed_whose_middle_is_too_near_the_crop_is_spared(neighbour: PlantKind) -> None:
     planner = SprayPlanner(lanes=10, width=0.1, safety=0.03, margin=0.01)
     for gap, sprayed in ((0.02, False), (0.04, True)):
-        near = plants((0.6, 0.25, 0.02, WEED), (0.6 + 0.02 + 0.01 + gap + 0.05, 0.25, 0.05, neighbour))
+        near = plants((0.6, 0.25, 0.02, WEED), (0.6 + 0.01 + gap + 0.05, 0.25, 0.05, neighbour))
         assert (len(planner.plan(near, 1.0)) == 1) == sprayed
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_jet_is_shortened_where_all_of_it_would_come_too_near_the_crop(side: float) -> None:
+    planner = SprayPlanner(lanes=10, width=0.1, safety=0.03, margin=0.01, boom_x=0.0, latency=0.0)
+    near = plants((0.6, 0.25, 0.02, WEED), (0.6 + side * (0.02 + 0.03 + 0.05), 0.25, 0.05, CROP))
+    spray = planner.plan(near, 2.0)
+    half = float(spray.weeds.radii[0]) + planner.margin
+    middle = float(spray.times[0]) * 2.0
+    # 30 mm on the open side, and 20 mm towards the crop, whose leaves begin 50 mm from the weed
+    assert sorted((side * (middle - half - 0.6), side * (middle + half - 0.6))) == pytest.approx(
+        [-0.03, 0.02]
+    )
+    assert near.areas[0] == pytest.approx(np.pi * 0.02**2)
+
+
+def test_who_does_not_know_well_where_a_weed_is_opens_the_next_nozzle_too() -> None:
+    planner = SprayPlanner(lanes=10, width=0.1)
+    for sigma, lanes in ((0.0, [7]), (0.03, [6, 7])):
+        weed = plants((0.6, 0.22, 0.01, WEED))
+        weed.covariance[:] = sigma**2 * np.eye(2)
+        assert planner.plan(weed, 1.0).lanes.tolist() == lanes
+
+
+def test_who_does_not_know_well_where_the_crop_is_keeps_farther_off() -> None:
+    planner = SprayPlanner(lanes=10, width=0.1, safety=0.03, margin=0.01)
+    for sigma, count in ((0.0, 1), (0.06, 0)):
+        near = plants((0.6, 0.25, 0.01, WEED), (0.6, 0.25 - 0.05 - 0.05 - 0.04, 0.05, CROP))
+        near.covariance[1] = sigma**2 * np.eye(2)
+        assert len(planner.plan(near, 1.0)) == count
 
 
 @given(

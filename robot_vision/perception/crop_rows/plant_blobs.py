@@ -85,6 +85,11 @@ class GroundWindow:
     side: float
     fall: float
 
+    @property
+    def closes(self) -> bool:
+        """Whether the crop closes over the ground."""
+        return bool(np.count_nonzero(self.cells) >= _CLOSES * np.count_nonzero(self.seen))
+
     def at(self, places: Array) -> tuple[NDArray[np.intp], Mask]:
         """Cells (N, 2) of places (N, 2) in the window's plane, and whether they are in view."""
         index = np.rint((places - self.corner) / self.side).astype(np.intp)
@@ -167,7 +172,7 @@ class PlantSegmenter:
         row, column = np.nonzero(grown)
         label = labels[row, column].astype(np.intp)
         if radius is not None:
-            if len(row) < _CLOSES * np.count_nonzero(window.seen):
+            if not window.closes:
                 most = _TOO_LARGE * np.pi * (radius / self.side) ** 2
                 count = cut_beside(joined, labels, count, radius / self.side, self.side, most)
                 label = labels[row, column].astype(np.intp)
