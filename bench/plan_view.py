@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from bench.floor_scores import MapScores, PictureScores, joined, score_map
 from bench.floor_truth import floor_truth
+from bench.long_drive import Look, long_drive
 from bench.report import Cell, Row, Table, at_least, at_most
 from bench.road_motion import road_table
 from bench.sources import MissingSetError
-from robot_vision.mapping import OccupancyMap, PlanViewMapper, Pose
-from robot_vision.mapping.boundary import Boundary
-from robot_vision.mapping.ground_view import GroundView
-from robot_vision.mapping.plan_view import Seen
+from robot_vision.mapping import PlanViewMapper, Pose
 from robot_vision.perception import HeadingEstimator, LineDetector
 from robot_vision.simulation.body import BodyState
 from robot_vision.simulation.drive import STEPS_PER_SECOND
@@ -43,6 +41,8 @@ PATHS = (("path", {}, 105), ("path", {}, 106))
 SECONDS, QUICK_S = 6.0, 2.0
 _TRUTH_EVERY = 3
 LONG_DRIVE = 10_000
+_LOOKS = 30
+"""Pictures of the first drive that the long drive is made of."""
 
 
 @dataclass
@@ -53,13 +53,14 @@ class Drives:
     maps: list[MapScores] = field(default_factory=list)
     clearance: list[bool] = field(default_factory=list)
     cpu_s: list[float] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
 
 
 def run(quick: bool) -> list[Table]:
     """Measure; with two seconds of the first drive of each kind when it is to be quick."""
     seconds = QUICK_S if quick else SECONDS
     kinds = [_drives(worlds[: 1 if quick else None], seconds) for worlds in (CORRIDORS, PATHS)]
-    tables = [_table(kinds), _cost_table(kinds, 1000 if quick else LONG_DRIVE)]
+    tables = [_table(kinds), _cost_table(kinds, 600 if quick else LONG_DRIVE)]
     try:
         tables.append(road_table())
     except MissingSetError as missing:
@@ -85,6 +86,8 @@ def _drive(world: World, seed: int, seconds: float, drives: Drives) -> None:
         pose = Pose(*(float(value) for value in reading[:3]))
         estimate = mapper.update(picture, lines, points, world.camera, stamp, pose)
         drives.cpu_s.append(time.process_time() - began)
+        if len(drives.looks) < _LOOKS:
+            drives.looks.append(Look(picture, lines, points, pose))
         told.append(pose[:2])
         true.append((state.x, state.y))
         if estimate.layers is not None and number % _TRUTH_EVERY == 0:
@@ -182,28 +185,9 @@ def _table(kinds: list[Drives]) -> Table:
 
 def _cost_table(kinds: list[Drives], long: int) -> Table:
     spent = 1e3 * np.array([second for kind in kinds for second in kind.cpu_s])
-    first, last, size = _long_drive(long)
     rows = [
         Row("a picture, median", "ms", [Cell(float(np.median(spent)), at_most(40.0))]),
         Row("a picture, p95", "ms", [Cell(float(np.quantile(spent, 0.95)))]),
-        Row(f"map only, first tenth of {long} pictures", "ms", [Cell(first)], 2),
-        Row("map only, last tenth", "ms", [Cell(last, at_most(1.25 * first + 0.2))], 2),
-        Row("memory of the map at the end", "MB", [Cell(size, at_most(16.0))]),
+        *long_drive(kinds[0].looks, standard_camera(), long),
     ]
     return Table("Plan of the floor: CPU on one core, 640x480", ["mapper"], rows)
-
-
-def _long_drive(pictures: int) -> tuple[float, float, float]:
-    """CPU (ms a picture) of the map at the start and the end of a drive of 0.1 m a picture, and its size (MB)."""
-    view = GroundView(standard_camera(), 0.5)
-    rows = np.full(view.shape[1], float(view.top + 20))
-    boundary = Boundary.at(rows, np.ones(view.shape[1], bool), view)
-    seen, grown = Seen(boundary, view, 7.0), OccupancyMap()
-    spent = np.empty(pictures)
-    for number in range(pictures):
-        began = time.process_time()
-        grown.update(seen, Pose(0.1 * number, 0.0, 0.0))
-        spent[number] = time.process_time() - began
-    tenth = pictures // 10
-    first, last = (1e3 * float(np.mean(part)) for part in (spent[:tenth], spent[-tenth:]))
-    return first, last, grown.nbytes / 1e6

@@ -16,6 +16,10 @@ Scores = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 
+_SIDE = 2
+"""Columns to either side over which the direction of the end of the floor is read."""
+
+
 @dataclass(frozen=True)
 class Boundary:
     """The end of the floor in each column of the working picture.
@@ -25,6 +29,8 @@ class Boundary:
         ended: (W,) whether something stands there; else the floor goes on as far as can be told.
         distance: (W,) of the end, m from the camera over the floor.
         x, y: (W,) of the end, m in base_link.
+        facing: (W,) sine of the angle under which the camera looks at the end of the floor: 1 for what faces it, near
+            0 for what recedes along the ray, as the rim of a thing before what lies behind it does.
     """
 
     rows: Array
@@ -32,12 +38,15 @@ class Boundary:
     distance: Array
     x: Array
     y: Array
+    facing: Array
 
     @classmethod
     def at(cls, rows: Array, ended: NDArray[np.bool_], view: GroundView) -> Boundary:
         """The boundary at given rows (W,)."""
         x, y = view.ground(np.arange(len(rows), dtype=np.float64), rows)
-        return cls(rows, ended, np.hypot(x - view.camera.x_m, y), x, y)
+        ahead = x - view.camera.x_m
+        distance = np.hypot(ahead, y)
+        return cls(rows, ended, distance, x, y, _facing(ahead, y, distance))
 
 
 @dataclass(frozen=True)
@@ -181,6 +190,14 @@ class BoundaryFinder:
         curve = low - 2.0 * mid + high
         shift = np.where(curve < -1e-3, 0.5 * (low - high) / np.minimum(curve, -1e-3), 0.0)
         return np.asarray(rows + np.clip(shift, -0.5, 0.5))
+
+
+def _facing(ahead: Array, left: Array, distance: Array) -> Array:
+    """Sine of the angle between ray and end of the floor (W,), over two columns to either side."""
+    x, y = (np.pad(part, _SIDE, mode="edge") for part in (ahead, left))
+    along_x, along_y = (part[2 * _SIDE :] - part[: -2 * _SIDE] for part in (x, y))
+    across = np.abs(ahead * along_y - left * along_x)
+    return np.asarray(across / np.maximum(distance * np.hypot(along_x, along_y), 1e-9))
 
 
 def _median(values: Array, width: int) -> Array:

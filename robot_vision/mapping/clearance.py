@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far the floor goes on without a gap along the way ahead, read in one picture: no map and no odometry needed."""
+"""How far the floor goes on without a gap along the way ahead, read in one picture: no map and no odometry needed.
+
+What has left the picture, because the robot has come too near, is remembered where there is a map.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,12 @@ import numpy as np
 
 from robot_vision.mapping.boundary import Boundary
 from robot_vision.mapping.ground_view import GroundView
+from robot_vision.mapping.occupancy import OccupancyMap
+from robot_vision.mapping.pose import Pose
 from robot_vision.perception import Role, VanishingPoints
+
+_HIDDEN_M, _STEP_M = 3.0, 0.025
+"""How far ahead of the front the map is asked, and how closely: four points to a cell of 5 cm."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +27,7 @@ class Clearance:
     Args:
         width: of the strip, m: the robot's and some more.
         front: how far the robot's front lies ahead of base_link, m; the clearance begins there.
-        fewest: columns of the picture that must see something in the way: fewer are noise.
+        fewest: columns of the picture, or points of the map, that must have something in the way: fewer are noise.
     """
 
     width: float = 0.6
@@ -62,6 +70,39 @@ class Clearance:
             # The picture begins with it: what is nearer than the picture shows is not known to be free.
             return 0.0
         return max(nearest - self.front, 0.0)
+
+    def remembered(
+        self, known: OccupancyMap, pose: Pose, points: VanishingPoints | None, view: GroundView
+    ) -> float:
+        """Way to what the map has in the strip and this picture does not show, m from the robot's front.
+
+        A thing at the rim of the strip leaves the picture before the robot has passed it.
+
+        Args:
+            known: the map.
+            pose: of base_link in it.
+            points: vanishing points; without a primary one the way ahead is the robot's own.
+            view: of the ground in the working picture.
+
+        Returns:
+            inf when nothing is there.
+        """
+        toward = self._azimuth(points, view)
+        half = self.width / 2
+        along, across = np.meshgrid(
+            np.arange(self.front, self.front + _HIDDEN_M, _STEP_M), np.arange(-half, half, _STEP_M)
+        )
+        x = np.cos(toward) * along - np.sin(toward) * across
+        y = np.sin(toward) * along + np.cos(toward) * across
+        rows, columns = view.shape
+        with np.errstate(invalid="ignore"):
+            u, v = view.pixels(x, y)
+            shown = (u > -0.5) & (u < columns - 0.5) & (v < rows - 0.5)
+        here = pose.matrix @ np.stack([x[~shown], y[~shown], np.ones(int((~shown).sum()))])
+        taken = known.odds(here[0], here[1]) > known.known
+        if taken.sum() < self.fewest:
+            return float("inf")
+        return max(float(np.sort(along[~shown][taken])[self.fewest - 1]) - self.front, 0.0)
 
     @staticmethod
     def _azimuth(points: VanishingPoints | None, view: GroundView) -> float:

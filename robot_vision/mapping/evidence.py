@@ -58,7 +58,7 @@ class Evidence:
         weight = trust * np.minimum(parallax.telling / np.float32(self.enough), np.float32(1.0))
         against = np.float32(self.expected * usual)
         moves = np.clip((shown - against) * np.float32(self.parallax), -limit, limit) * weight
-        shines = (mirrored > self.mirror) & (mirrored > 0.7 * raised)
+        shines = (mirrored > self.mirror) & (mirrored > 0.7 * raised) & _over_floor(score > 0.0)
         score = np.where(shines, limit, score + moves)
         return np.asarray(np.clip(score, -limit, limit), np.float32)
 
@@ -68,6 +68,11 @@ class Evidence:
         if floor.sum() < _FEWEST:
             return 0.0
         return float(np.median(shown[::2, ::3][floor]))
+
+
+def _over_floor(floor: Mask) -> Mask:
+    """What lies above floor (H, W) in its column: a mirror is part of the floor before it, a thing too near is not."""
+    return np.logical_or.accumulate(floor[::-1], axis=0)[::-1]
 
 
 def sharp(gray: NDArray[np.uint8], contrast: float, rows: int) -> Mask:

@@ -78,6 +78,8 @@ class GroundLines:
         step: difference of the mean score of these strips that makes a line a border.
         doubtful: mean score of the worse one above which it is floor whatever the other one is.
         along: share of its sections in which a border must be one.
+        shortest: length of a line that can be a border, working pixels: a thing beside a joint blurs what lies about it
+            over some ten of them.
         snap: distance over which the end of the floor is drawn to a border, working pixels.
     """
 
@@ -86,6 +88,7 @@ class GroundLines:
     step: float = 0.9
     doubtful: float = 1.8
     along: float = 0.7
+    shortest: float = 20.0
     snap: float = 2.5
 
     def sort(
@@ -122,6 +125,7 @@ class GroundLines:
         ends, near = ends[floor], near[:, floor]
         rim = Beside(ends, view, vanishing, RIM)
         stops = self._stops(near, rim.means(score), rim.means(dim.astype(np.float32)) < 0.4)
+        stops &= (np.hypot(*(ends[:, 2:] - ends[:, :2]).T) >= self.shortest)[:, None]
         kinds[chosen[floor][stops.any(axis=(0, 2))]] = LineKind.BORDER
         return kinds, Borders.along(ends, stops)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from robot_vision.mapping.beside_lines import RIM, Beside
 from robot_vision.mapping.ground_lines import Borders
 from robot_vision.mapping.ground_view import GroundView
+from robot_vision.mapping.plane_motion import Parallax
 from robot_vision.mapping.pose import Pose
 
 Array = NDArray[np.float64]
@@ -19,6 +20,8 @@ Scores = NDArray[np.float32]
 
 _SECTIONS = 16
 _LEFT, _RIGHT = 0, 1
+_TELLING = 0.3
+"""Mean of `Parallax.telling` along a line below which parallax tells nothing of it."""
 
 
 @dataclass
@@ -36,7 +39,8 @@ class KerbFinder:
 
     Stones differ from each other, too: a kerb differs along all of its length, and by more than its sections do among
     themselves. The line is followed over all the ground in view, not only where it was seen as a line, and a kerb
-    found once is looked for in the pictures that follow.
+    found once is looked for in the pictures that follow. The outermost row of stones is such a strip, too: along the
+    whole line parallax tells that it lies as low as the floor.
 
     Args:
         beside: distance from the line of the strips that are compared, from and to, m.
@@ -47,6 +51,7 @@ class KerbFinder:
         fewest: sections, of 16, that must show a kerb that is new, and one that is known.
         apart: distance across the way that two lines must have to be judged each for itself, m.
         reach: how far a kerb is followed, m.
+        low: share of what the floor beside shows by parallax that a strip must show to be floor.
         kept: way over which a kerb that is not seen is still known, m.
     """
 
@@ -57,6 +62,7 @@ class KerbFinder:
     fewest: tuple[int, int] = (5, 2)
     apart: float = 0.04
     reach: float = 8.0
+    low: float = 0.65
     kept: float = 2.0
     _known: list[_Known] = field(default_factory=list, init=False, repr=False)
     _last: Pose | None = field(default=None, init=False, repr=False)
@@ -75,6 +81,7 @@ class KerbFinder:
         lab: NDArray[np.uint8],
         view: GroundView,
         pose: Pose | None,
+        parallax: Parallax | None = None,
     ) -> Borders:
         """Find the lines at which the floor ends in a kerb.
 
@@ -86,6 +93,7 @@ class KerbFinder:
             lab: (H - view.top, W, 3) colours, CIE Lab of OpenCV.
             view: of the ground in the working picture.
             pose: of the robot in odom; None without odometry: then every kerb is new.
+            parallax: of the part of the picture that shows ground; None without an earlier picture.
         """
         self._move(direction, view, pose)
         vanishing = view.camera.pixels(direction[None])[0] * view.scale + (view.scale - 1.0) / 2.0
@@ -94,7 +102,7 @@ class KerbFinder:
         if not len(aside):
             return Borders.none()
         rays = self._rays(aside / height, vanishing, view, height)
-        marks = self._marks(rays, aside, vanishing, score, dim, lab, view)
+        marks = self._marks(rays, aside, vanishing, score, dim, lab, view, parallax)
         self._remember(aside, np.asarray(marks.any(axis=2)))
         return Borders.along(rays, marks)
 
@@ -147,6 +155,7 @@ class KerbFinder:
         dim: Mask,
         lab: NDArray[np.uint8],
         view: GroundView,
+        parallax: Parallax | None,
     ) -> Mask:
         """Sections (2, M, sections) to whose left or right a kerb stands."""
         beside, beyond, rim = (
@@ -168,7 +177,19 @@ class KerbFinder:
             found |= np.abs(mean) > np.maximum(sure * error, self.tint)
         found &= count >= np.where(known, self.fewest[1], self.fewest[0])
         found &= count > np.where(known, 0.3, 0.6) * like.sum(axis=2)
+        if parallax is not None:
+            found &= ~self._lies_low(beside, ended, parallax)
         return np.asarray(_runs(ended) & found[..., None])
+
+    def _lies_low(self, beside: Beside, here: Mask, parallax: Parallax) -> Mask:
+        """Which strips (2, M) lie as low as the floor on the other side of their line, in the sections marked."""
+        flat, telling = (np.nan_to_num(beside.means(part)) for part in (-parallax.raised, parallax.telling))
+        shown = [
+            (part * here).sum(axis=2) / np.maximum((told * here).sum(axis=2), 1e-6)
+            for part, told in ((flat, telling), (flat[::-1], telling[::-1]))
+        ]
+        tells = (telling * here).sum(axis=2) > _TELLING * here.sum(axis=2)
+        return np.asarray(tells & (shown[0] > self.low * np.maximum(shown[1], 0.0)))
 
     def _is_known(self, aside: Array) -> Mask:
         """Which places (M,) are, on the left and on the right (2, M), those of known kerbs."""

@@ -16,6 +16,7 @@ from robot_vision.mapping.boundary import Boundary, BoundaryFinder
 from robot_vision.mapping.clearance import Clearance
 from robot_vision.mapping.evidence import Evidence, sharp
 from robot_vision.mapping.feature_points import FeatureAnnotator, GroundPoints
+from robot_vision.mapping.floor_sample import FloorSample
 from robot_vision.mapping.ground_lines import Borders, GroundLines, LineKind
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.horizon import Horizon, HorizonFilter
@@ -95,8 +96,8 @@ class PlanViewMapper:
         unchecked: weight in the map of a picture that could not be held against an earlier one.
         slip: share of the way that odometry may be wrong by before its pictures stay out of the map.
         low_borders: whether floor may end at a line beyond which nothing stands up; not where all that stands is tall.
-        horizon, appearance, motion, evidence, shadows, finder, lines, kerbs, objects, maker, clearance, features, map:
-            the stages.
+        horizon, sample, appearance, motion, evidence, shadows, finder, lines, kerbs, objects, maker, clearance,
+            features, map: the stages.
 
     Raises:
         ValueError: naming the setting that is not a positive number.
@@ -108,6 +109,7 @@ class PlanViewMapper:
     slip: float = 0.1
     low_borders: bool = True
     horizon: HorizonFilter = field(default_factory=HorizonFilter)
+    sample: FloorSample = field(default_factory=FloorSample)
     appearance: FloorAppearance = field(default_factory=FloorAppearance)
     motion: PlaneMotion = field(default_factory=PlaneMotion)
     evidence: Evidence = field(default_factory=Evidence)
@@ -121,7 +123,6 @@ class PlanViewMapper:
     features: FeatureAnnotator = field(default_factory=FeatureAnnotator)
     map: OccupancyMap = field(default_factory=OccupancyMap)
     _slips: deque[float] = field(default_factory=lambda: deque(maxlen=15), init=False, repr=False)
-    _unlike: Pose | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("reach", "trusted", "unchecked", "slip"):
@@ -131,10 +132,10 @@ class PlanViewMapper:
 
     def reset(self) -> None:
         """Forget everything earlier pictures told, the map too."""
-        for stage in (self.horizon, self.appearance, self.motion, self.shadows, self.kerbs, self.map):
+        stages = (self.horizon, self.sample, self.appearance, self.motion, self.shadows, self.kerbs, self.map)
+        for stage in stages:
             stage.reset()
         self._slips.clear()
-        self._unlike = None
 
     def warm_up(self) -> None:
         """Go once through all stages, so that the first picture is not kept waiting."""
@@ -227,7 +228,9 @@ class PlanViewMapper:
             dim = self.shadows.dim(lower)
             kinds, borders = self.lines.sort(lines, points, score, dim, view)
             if self.low_borders:
-                borders = borders.joined(self._kerbs(lines, kinds, points, score, dim, lab[top:], view, pose))
+                borders = borders.joined(
+                    self._kerbs(lines, kinds, points, score, dim, lab[top:], view, pose, parallax)
+                )
                 score[self.lines.cut(borders, score.shape, view)] = -1.0
         boundary = self.finder.find(score, sharp(gray, 4.0, 4)[top:], gray, view, reach)
         straight = self.lines.straighten(boundary, borders, view)
@@ -240,7 +243,7 @@ class PlanViewMapper:
             self.map.update(seen, pose, 1.0 if parallax is not None else self.unchecked)
         return PlanViewEstimate(
             plan_view=self.maker.draw(seen),
-            clearance=0.0 if strange else self.clearance.measure(straight, points, view, reach),
+            clearance=0.0 if strange else self._clear(straight, points, view, reach, pose),
             objects=self.objects.find(straight, on_border, view),
             horizon=horizon,
             mapped=mapped,
@@ -259,42 +262,34 @@ class PlanViewMapper:
         lab: Picture,
         view: GroundView,
         pose: Pose | None,
+        parallax: Parallax | None,
     ) -> Borders:
         primary = points.of(Role.PRIMARY)
         if primary is None:
             return Borders.none()
         ends = lines.endpoints[kinds != LineKind.IRRELEVANT] * view.scale + (view.scale - 1.0) / 2.0
-        return self.kerbs.find(ends, points.directions[primary], score, dim, lab, view, pose)
+        return self.kerbs.find(ends, points.directions[primary], score, dim, lab, view, pose, parallax)
 
     def _learn(self, lower: Picture, lab: Picture, view: GroundView, pose: Pose | None) -> str:
-        """Learn the floor just before the robot; say so if it looks like no floor that is known.
-
-        What suddenly stands before the robot must not be learnt: another floor is believed once the robot has
-        driven over it.
-        """
-        rows, columns = view.shape
-        height = view.camera.height_m or 1.0
-        v = np.arange(view.top + int(0.62 * (rows - view.top)), rows, dtype=np.float64)
-        _, y = view.ground(*np.meshgrid(np.arange(columns, dtype=np.float64), v))
-        sample = np.zeros(lower.shape[:2], bool)
-        sample[-len(v) :] = np.abs(y) < 0.6 * height
+        """Learn the floor just before the robot; say so if it looks like no floor that is known."""
         part = lab[view.top :]
-        strange = ""
-        if self.appearance.knows:
-            like = np.asarray(self.appearance.score(part[-len(v) :]) > 0.0)
-            share = float(like[sample[-len(v) :]].mean()) if sample.any() else 0.0
-            if share < 0.3:
-                strange = "what is just before the robot looks like no floor seen so far"
-                self._unlike = self._unlike or pose
-                over = pose and self._unlike and np.hypot(pose.x - self._unlike.x, pose.y - self._unlike.y)
-                if not over or over < 2.5 * height:
-                    return strange
-            else:
-                self._unlike = None
-                sample[-len(v) :] &= like if share <= 0.9 else ~_from_above(like)
-        self.appearance.learn(part, sample, lab[: max(view.top, 1)])
-        self.shadows.learn(lower, sample)
+        sample, strange = self.sample.choose(part, self.appearance, view, pose)
+        if sample is not None:
+            self.appearance.learn(part, sample, lab[: max(view.top, 1)])
+            self.shadows.learn(lower, sample)
         return strange
+
+    def _clear(
+        self,
+        boundary: Boundary,
+        points: VanishingPoints | None,
+        view: GroundView,
+        reach: float,
+        pose: Pose | None,
+    ) -> float:
+        """Free floor ahead of the robot's front, m: what the picture shows, and what the map knows that it does not."""
+        clear = self.clearance.measure(boundary, points, view, reach)
+        return clear if pose is None else min(clear, self.clearance.remembered(self.map, pose, points, view))
 
     def _slip(self, parallax: Parallax | None) -> float:
         if parallax is not None and np.isfinite(parallax.slip):
@@ -322,14 +317,6 @@ def _half(picture: Picture) -> Picture:
     size = (round(picture.shape[1] * 0.5), round(picture.shape[0] * 0.5))
     half = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     return np.asarray(half if half.ndim == 3 else cv2.cvtColor(half, cv2.COLOR_GRAY2BGR))
-
-
-def _from_above(like: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What reaches down from above (H, W) in columns of a picture before anything is like the floor.
-
-    New tints among those of the floor are floor, too; what comes in from above may be the foot of a wall.
-    """
-    return ~np.logical_or.accumulate(like, axis=0)
 
 
 def _unreadable(gray: Picture) -> str:

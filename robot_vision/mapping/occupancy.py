@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry.rotation import wrap_angle
-from robot_vision.mapping.plan_view import FREE, OCCUPIED, UNKNOWN, PlanView, Seen
+from robot_vision.mapping.plan_view import DOUBTFUL, FREE, OCCUPIED, UNKNOWN, PlanView, Seen
 from robot_vision.mapping.pose import Pose
 
 LogOdds = NDArray[np.float32]
@@ -101,6 +101,9 @@ class OccupancyMap:
         weight = trust / (1.0 + (np.hypot(ahead, left) / self.near) ** 2)
         part = self._odds[rows, columns]
         part += np.where(cells == OCCUPIED, self.taken, np.where(cells == FREE, -self.free, 0.0)) * weight
+        # What ends somewhere about here speaks against free floor, but for nothing in its place.
+        doubt = cells == DOUBTFUL
+        part[doubt] = np.minimum(part[doubt] + self.taken * weight[doubt], np.maximum(part[doubt], 0.0))
         np.clip(part, -self.limit, self.limit, out=part)
 
     def odds(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> LogOdds:

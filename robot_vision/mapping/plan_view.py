@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 Cells = NDArray[np.int8]
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+DOUBTFUL = 50
+"""The floor ends about there, but at which of these cells the ray is too flat to tell: only a map can."""
+_FLATTEST = 0.01
+"""Least sine of the angle between ray and end of the floor that is reckoned with."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class Seen:
         reach: beyond which nothing is said, m from the camera.
         thickness: of the part behind the end of the floor that is taken for the thing that stands there, m.
         margin: before the end of the floor within which nothing is said, m: an edge is seen to about as much.
-        inside: behind the end of the floor up to which nothing is said, m: half a cell, all of which must lie
-            behind it.
+        inside: behind the end of the floor up to which nothing is taken, m across it: half a cell, all of which must
+            lie behind it.
     """
 
     boundary: Boundary
@@ -55,7 +59,7 @@ class Seen:
     inside: float = 0.025
 
     def at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> Cells:
-        """FREE, OCCUPIED or UNKNOWN for points x, y (m) in base_link, in any shape."""
+        """FREE, OCCUPIED, DOUBTFUL or UNKNOWN for points x, y (m) in base_link, in any shape."""
         u, v = self.view.pixels(x, y)
         rows, columns = self.view.shape
         inside = (u > -0.5) & (u < columns - 0.5) & (v < rows - 0.5)
@@ -64,11 +68,14 @@ class Seen:
         # At the end of the floor distances grow too fast with the row for a whole one to do.
         behind = away - self.boundary.distance[column]
         ended = self.boundary.ended[column]
-        free = inside & (behind < np.where(ended, -self.margin, 0.0)) & (away < self.reach)
-        taken = inside & ended & (behind >= self.inside) & (behind < self.thickness) & (away < self.reach)
+        # `inside` is measured across the end; along the ray, which meets it at an angle, it is longer.
+        slant = 1.0 / np.maximum(self.boundary.facing, _FLATTEST)[column]
+        looked_at = inside & (away < self.reach)
+        free = looked_at & (behind < np.where(ended, -self.margin, 0.0))
+        there = looked_at & ended & (behind >= self.inside) & (behind < self.thickness)
         cells = np.full(np.shape(x), UNKNOWN, np.int8)
         cells[free] = FREE
-        cells[taken] = OCCUPIED
+        cells[there] = np.where(behind >= self.inside * slant, OCCUPIED, DOUBTFUL)[there]
         return cells
 
 
@@ -106,4 +113,5 @@ class PlanViewMaker:
         """The plan of what was seen; all unknown when nothing was."""
         x, y = self.__dict__["_x"], self.__dict__["_y"]
         cells = np.full(x.shape, UNKNOWN, np.int8) if seen is None else seen.at(x, y)
+        cells[cells == DOUBTFUL] = OCCUPIED
         return PlanView(cells, self.resolution, (0.0, -self.half_width))

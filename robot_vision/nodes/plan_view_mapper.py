@@ -33,6 +33,7 @@ from robot_vision.ros.parameters import CAMERA_PLACE, Setting, camera_place
 from robot_vision.ros.run import run_node
 
 LASTING = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+KNOCK_ADVICE = "put the camera back, or set camera.pitch and camera.roll anew"
 HEIGHT_ADVICE = "measure how high the camera sits over the ground and set camera.height"
 SMALLEST_PITCH = 1e-5
 """Pitch (rad) that odometry must once have told before it is believed to know of any."""
@@ -270,7 +271,10 @@ class PlanViewMapperNode(VisionNode):
         self._overlay.publish(image_message(header, draw_plan_view(picture, lines, estimate)))
 
     def _tell(self, estimate: PlanViewEstimate) -> None:
-        if estimate.layers is None:
+        if estimate.horizon.knocked:
+            # Certain in one picture and corrected in the next: who asks later must still find it.
+            self.complain(self._topic, estimate.reason, KNOCK_ADVICE)
+        elif estimate.layers is None:
             self.diagnostics.report(Level.ERROR, estimate.reason, "nothing is called free until this is over")
         elif estimate.reason:
             self.diagnostics.report(Level.WARN, estimate.reason)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.kerbs import KerbFinder
+from robot_vision.mapping.plane_motion import Parallax
 from robot_vision.mapping.pose import Pose
 
 VIEW = GroundView(Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=0.6, pitch=math.radians(8.0)), 0.5)
@@ -84,6 +86,30 @@ def test_a_kerb_in_shadow_cannot_be_told_from_the_shadow() -> None:
     score, _, lab = picture(-4.0)
     dim = np.ones(score.shape, bool)
     assert len(KerbFinder().find(lines(FOOT), AHEAD, score, dim, lab, VIEW, None).ends) == 0
+
+
+def moved(kerb: float) -> Parallax:
+    """What motion tells of that floor: it shows half of what floor should, the strip the share `kerb` of that."""
+    x, y = ground()
+    telling = np.ones(x.shape, np.float32)
+    strip = (y > FOOT) & (y < BACK)
+    raised = np.where(strip, np.float32(-0.5 * kerb), np.float32(-0.5))
+    none = np.zeros((0, 2))
+    return Parallax(raised, telling * 0.0, telling, 0.3, 0.0, 0.0, 0.01, none, none, np.zeros(0))
+
+
+@pytest.mark.parametrize(("shows", "found"), [(0.3, True), (1.0, False)])
+def test_the_outermost_row_of_stones_lies_as_low_as_the_floor_and_is_no_kerb(
+    shows: float, found: bool
+) -> None:
+    borders = KerbFinder().find(lines(FOOT), AHEAD, *picture(-4.0), VIEW, None, moved(shows))
+    assert bool(len(borders.ends)) == found
+
+
+def test_motion_that_tells_nothing_of_a_strip_leaves_it_a_kerb() -> None:
+    blank = moved(1.0)
+    blank = replace(blank, raised=blank.raised * 0.1, telling=blank.telling * 0.1)
+    assert len(KerbFinder().find(lines(FOOT), AHEAD, *picture(-4.0), VIEW, None, blank).ends)
 
 
 def test_a_known_kerb_is_found_behind_a_thing_that_hides_most_of_it() -> None:

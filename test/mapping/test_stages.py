@@ -14,11 +14,15 @@ from robot_vision.mapping import OccupancyMap, PlanViewMapper, Pose, PoseHistory
 from robot_vision.mapping.appearance import FloorAppearance
 from robot_vision.mapping.boundary import Boundary
 from robot_vision.mapping.clearance import Clearance
+from robot_vision.mapping.evidence import Evidence
+from robot_vision.mapping.ground_lines import GroundLines
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.horizon import HorizonFilter
 from robot_vision.mapping.objects import ObjectFinder
 from robot_vision.mapping.overlay import draw_plan_view
-from robot_vision.mapping.plan_view import FREE, OCCUPIED, UNKNOWN, Seen
+from robot_vision.mapping.plan_view import DOUBTFUL, FREE, OCCUPIED, UNKNOWN, PlanViewMaker, Seen
+from robot_vision.mapping.plane_motion import Parallax
+from robot_vision.perception import LineSegments
 
 VIEW = GroundView(CAMERA, 0.5)
 
@@ -91,6 +95,109 @@ def test_clearance_begins_at_the_front_and_needs_more_than_noise() -> None:
     assert clearance.measure(Boundary.at(rows, speck.ended, VIEW), None, VIEW, 5.0) == np.inf
     with pytest.raises(ValueError, match="width"):
         Clearance(width=0.0)
+
+
+def test_what_has_left_the_picture_is_remembered_until_the_robot_has_passed_it() -> None:
+    """A thing 0.2 m to the left, at the rim of the strip; from 0.9 m before it on the picture shows none of it."""
+    clearance, known = Clearance(width=0.6, front=0.3), OccupancyMap()
+    for number in range(5):
+        foot = wall_at(1.3 - 0.05 * number)
+        post = (foot.y > 0.15) & (foot.y < 0.35)
+        known.update(Seen(Boundary.at(foot.rows, post, VIEW), VIEW, 3.0), Pose(0.05 * number, 0.0, 0.0))
+    near = Pose(0.7, 0.0, 0.0)
+    assert clearance.measure(wall_at(5.0), None, VIEW, 4.0) == np.inf
+    assert clearance.remembered(known, near, None, VIEW) == pytest.approx(0.3, abs=0.06)
+    assert clearance.remembered(known, Pose(0.7, -0.3, 0.0), None, VIEW) == np.inf, "it stands beside the way"
+    assert clearance.remembered(known, Pose(1.4, 0.0, 0.0), None, VIEW) == np.inf, "it has been passed"
+    assert clearance.remembered(known, Pose(-2.0, 0.0, 0.0), None, VIEW) == np.inf, "the picture shows it"
+
+
+def test_the_end_of_the_floor_faces_the_camera_or_recedes() -> None:
+    ahead = wall_at(3.0)
+    assert ahead.facing[160] == pytest.approx(1.0, abs=0.02)
+    u, v = VIEW.pixels(np.linspace(8.0, 1.2, 400), np.full(400, -1.0))
+    place = np.interp(np.arange(320.0), u, v)
+    beside = Boundary.at(place, np.ones(320, bool), VIEW)
+    seen = slice(int(u[0]) + 3, 315)
+    truth = np.abs(beside.y[seen]) / beside.distance[seen]
+    np.testing.assert_allclose(beside.facing[seen], truth, rtol=0.03)
+
+
+def test_what_recedes_along_the_ray_is_a_doubt_to_the_map_and_taken_to_the_plan() -> None:
+    """A thing at 2 m before a wall at 4 m: between the two its rim is no place where anything stands."""
+    wall, thing = wall_at(4.0), wall_at(2.0)
+    rows = wall.rows.copy()
+    rows[:150] = thing.rows[:150]
+    rows[150:156] = np.linspace(thing.rows[150], wall.rows[156], 6)
+    seen = Seen(Boundary.at(rows, wall.ended, VIEW), VIEW, 6.0)
+    x, y = VIEW.ground(np.full(20, 153.0), np.full(20, rows[153]))
+    x, y = x + np.linspace(0.04, 0.1, 20), y
+    assert set(seen.at(x, y).tolist()) == {DOUBTFUL}
+    assert set(seen.at(np.full(5, 2.06), np.linspace(0.2, 0.4, 5)).tolist()) == {OCCUPIED}
+    assert DOUBTFUL not in PlanViewMaker().draw(seen).cells
+
+
+def test_a_doubt_takes_back_what_was_free_and_makes_nothing_taken() -> None:
+    grown = OccupancyMap()
+    place = np.array([3.0]), np.array([0.0])
+
+    def look(cells: int, x: float) -> float:
+        grown.update(Everywhere(wall_at(6.0), VIEW, 6.0, cells=cells), Pose(x, 0.0, 0.0))
+        return float(grown.odds(*place)[0])
+
+    assert look(FREE, 0.0) < -0.1
+    assert look(DOUBTFUL, 0.03) == 0.0
+    assert look(DOUBTFUL, 0.06) == 0.0
+    taken = look(OCCUPIED, 0.09)
+    assert taken > 0.1
+    assert look(DOUBTFUL, 0.12) == taken
+
+
+@dataclass(frozen=True)
+class Everywhere(Seen):
+    """The same seen of all cells."""
+
+    cells: int = FREE
+
+    def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.full(np.shape(x), self.cells, np.int8)
+
+
+def test_a_thing_too_near_to_show_its_foot_is_no_mirror() -> None:
+    """What seems to lie below the floor is a reflection only above floor in its column."""
+    likeness = np.full((100, 60), -3.0, np.float32)
+    likeness[60:, 30:] = 3.0
+    telling = np.ones_like(likeness)
+    raised = np.where(likeness > 0.0, -telling, 0.0 * telling)
+    mirrored = np.where(likeness < 0.0, telling, 0.0 * telling)
+    none = np.zeros((0, 2))
+    parallax = Parallax(raised, mirrored, telling, 0.3, 0.0, 0.0, 0.01, none, none, np.zeros(0))
+    score = Evidence().score(likeness, parallax)
+    assert (score[:60, 30:] > 0.0).all()
+    assert (score[:, :30] < 0.0).all()
+
+
+def test_a_line_too_short_to_be_told_from_the_blur_about_a_thing_is_no_border() -> None:
+    ends = feet()
+    part = replace_ends(ends, 0.1)
+    score = np.full((VIEW.shape[0] - VIEW.top, VIEW.shape[1]), -3.0, np.float32)
+    x, y = VIEW.ground(
+        *np.meshgrid(np.arange(320, dtype=float), np.arange(VIEW.top, VIEW.shape[0], dtype=float))
+    )
+    score[(np.abs(y) < 1.0) & np.isfinite(x)] = 3.0
+    dim = np.zeros(score.shape, bool)
+    whole, short = (
+        GroundLines().sort(lines, vanishing_points(), score, dim, VIEW)[1] for lines in (ends, part)
+    )
+    assert len(whole.ends)
+    assert not len(short.ends)
+
+
+def replace_ends(lines: LineSegments, share: float) -> LineSegments:
+    """The first share of each line."""
+    ends = lines.endpoints.copy()
+    ends[:, 2:] = ends[:, :2] + share * (ends[:, 2:] - ends[:, :2])
+    return LineSegments.from_endpoints(ends)
 
 
 def test_things_are_cut_out_where_the_floor_ends_sooner_than_beside_them() -> None:
