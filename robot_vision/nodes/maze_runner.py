@@ -4,7 +4,8 @@
 The maze has square cells of known side; its size, the start and the goal cells are known, no wall is. Each plan is
 answered by `steering` with its stamp. `maze` and `pose` tell what is known of the maze and where the robot believes to
 be, in the frame `maze`: x to the east, y to the north, from the corner where the outer walls meet in the south-west.
-When plans stop for `timeout`, the robot stands. The service `enable` (std_srvs/SetBool) stops and releases it.
+The robot stands while plans show nothing, while they stay the same although it moves, and without odometry. What else
+makes it stand is told in `ros/steering.py`.
 """
 
 from __future__ import annotations
@@ -12,13 +13,11 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
-from std_srvs.srv import SetBool
 
 from robot_vision.control.pursuit import PathPursuit
 from robot_vision.nodes.maze_planner import DRIVE_SETTINGS
@@ -27,16 +26,17 @@ from robot_vision.planning.maze_runner import MazeRunner
 from robot_vision.ros import calibration, floor_messages, maps, messages, qos
 from robot_vision.ros.calibration import Calibration
 from robot_vision.ros.diagnostics import Level
-from robot_vision.ros.node import VisionNode, stamp_ns
+from robot_vision.ros.node import stamp_ns
 from robot_vision.ros.parameters import CAMERA_PLACE, Setting, camera_place
 from robot_vision.ros.run import run_node
+from robot_vision.ros.steering import STEERING_SETTINGS, SteeringNode
 
 FRAME = "maze"
 HEADINGS = ("north", "east", "south", "west")
 LASTING = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class MazeRunnerNode(VisionNode):
+class MazeRunnerNode(SteeringNode):
     """`plan_view`, `vanishing_points`, `camera_info` and `odom` to `maze`, `pose`, `path` and `steering`."""
 
     SETTINGS = (
@@ -49,35 +49,27 @@ class MazeRunnerNode(VisionNode):
         Setting("wall", 0.067, "thickness of the walls, cells", 0.001, 0.5, live=False),
         *CAMERA_PLACE,
         *DRIVE_SETTINGS,
-        Setting("enabled", True, "whether to steer; the service enable sets it"),
-        Setting("timeout", 0.5, "stand still after so long without a plan of the floor, s", 0.05, 60.0),
+        *STEERING_SETTINGS,
     )
+    STEERS_BY = "plan of the floor"
+    ADVICE = "look what plan_view_mapper says on /diagnostics"
 
     def __init__(self) -> None:
         super().__init__("maze_runner")
         self._runner = self._new_runner()
         self._pursuit = PathPursuit()
         self._calibration = Calibration(camera_place(self.settings))
-        self._enabled = True
-        self._drives = False
-        self._header: Header | None = None
         self._told = -1
         self._stage = self._runner.stage
         self._maze = self.say(OccupancyGrid, "maze", LASTING)
         self._pose = self.say(PoseWithCovarianceStamped, "pose", qos.ANSWER)
         self._path = self.say(Path, "path", LASTING)
-        self._steering = self.say(TwistStamped, "steering", qos.ANSWER)
         self._camera_info = self.hear(CameraInfo, "camera_info", self._calibration.take, qos.SENSOR)
         self._odom = self.hear(Odometry, "odom", self._hear_odometry, qos.ODOMETRY, required=True)
         self._points = self.hear(
             PointCloud2, "vanishing_points", self._hear_vanishing_points, qos.ANSWER, required=True
         )
         self.hear(OccupancyGrid, "plan_view", self._hear_plan, qos.ANSWER, required=True, picture=True)
-        for name in ("enable", "~/enable"):
-            self.create_service(SetBool, name, self._enable)
-        clock = self.get_clock() if self.get_parameter("use_sim_time").value else self.steady_clock
-        self._watch = self.create_timer(self.settings["timeout"], self._stop_after_silence, clock=clock)
-        self._watch.cancel()
         self.use_settings()
 
     def warm_up(self) -> None:
@@ -91,21 +83,16 @@ class MazeRunnerNode(VisionNode):
         self._calibration.move(camera_place(values))
         for name, value in drive.items():
             setattr(self._pursuit, name, value)
-        self._watch.timer_period_ns = round(1e9 * values["timeout"])
-        enabled, self._enabled = self._enabled, values["enabled"]
-        if enabled and not self._enabled:
-            self._stand_still()
-            self.diagnostics.report(Level.WARN, "disabled", "call the service enable with true")
+        super().configure(values)
 
     def on_clock_jump_back(self) -> None:
         """Start anew, in the start cell."""
         self._runner = self._new_runner()
         self._pursuit.reset()
 
-    def stop(self) -> None:
-        """Leave no robot driving by the last word of a node that is gone; a replay drives none."""
-        if self._drives and not self.get_parameter("use_sim_time").value:
-            self._stand_still()
+    def reset_steering(self) -> None:
+        """Begin from standing."""
+        self._pursuit.reset()
 
     def _new_runner(self) -> MazeRunner:
         given = self.settings
@@ -143,66 +130,46 @@ class MazeRunnerNode(VisionNode):
         self._watch.reset()
         camera = self._calibration.camera
         if camera is None:
-            self._stand_still()
+            self.stand_still()
             cause = f"no direction without a calibration: {self._calibration.fault}"
             self.complain("camera_info", cause, calibration.ADVICE)
             return
-        stamp_s = 1e-9 * stamp_ns(message.header.stamp)
-        self._runner.see_plan(stamp_s, plan, camera.x_m)
-        self._drive(message.header, stamp_s)
+        now_ns = stamp_ns(message.header.stamp)
+        self._runner.see_plan(1e-9 * now_ns, plan, camera.x_m)
+        self._tell(message.header)
+        if self._enabled:
+            self._drive(message.header, now_ns)
         self.answered(message.header.stamp, began)
 
-    def _drive(self, header: Header, stamp_s: float) -> None:
+    def _tell(self, header: Header) -> None:
+        """Publish where the robot is, and way and maze where they are not what they were."""
         route, pose = self._runner.route(), self._runner.pose
-        if pose is None:
-            self._stand_still()
-            self.diagnostics.report(Level.WARN, f"stands still: {route.reason}", "look what says odom")
-            return
-        self._pose.publish(maps.place_to_message(header, pose, self._runner.sigma, FRAME))
+        if pose is not None:
+            self._pose.publish(maps.place_to_message(header, pose, self._runner.sigma, FRAME))
         if route.number != self._told:
             self._told = route.number
             self._path.publish(messages.path_to_message(header, route.points, FRAME))
             seen = maps.maze_to_message(header, self._runner.seen, self.settings["cell"], FRAME)
             self._maze.publish(seen)
-        if not self._enabled:
+
+    def _drive(self, header: Header, now_ns: int) -> None:
+        route, pose = self._runner.route(), self._runner.pose
+        refusal = self.refusal_of_age(now_ns) or (route.reason if pose is None else "")
+        if refusal or pose is None:
+            self.stand_still()
+            self.diagnostics.report(Level.WARN, f"stands still: {refusal}", "look what says odom")
             return
         place = pose.x, pose.y, pose.yaw
-        steering = self._pursuit.update(route.points, place, stamp_s, route.seen)
-        self._say(steering.speed, steering.turn_rate)
+        steering = self._pursuit.update(route.points, place, 1e-9 * now_ns, route.seen)
+        self.obey(steering.speed, steering.turn_rate)
         if not len(route.points):
-            self.diagnostics.report(
-                Level.WARN, f"stands still: {route.reason}", "turn the robot, or start anew"
-            )
+            level = Level.OK if route.done else Level.WARN
+            self.diagnostics.report(level, f"stands still: {route.reason}", f"{self.ADVICE}, or start anew")
             return
         self.diagnostics.report(Level.OK, self._runner.summary)
         if self._runner.stage != self._stage:
             self._stage = self._runner.stage
             self.get_logger().info(self._runner.summary)
-
-    def _stop_after_silence(self) -> None:
-        self._watch.cancel()
-        self._stand_still()
-        self.diagnostics.report(
-            Level.WARN,
-            f"stands still: no plan of the floor for {self.settings['timeout']:g} s",
-            "look what says plan_view_mapper on /diagnostics",
-        )
-
-    def _stand_still(self) -> None:
-        self._pursuit.reset()
-        self._say(0.0, 0.0)
-
-    def _say(self, speed: float, turn_rate: float) -> None:
-        if self._header is None:
-            return
-        self._drives = speed != 0.0 or turn_rate != 0.0
-        self._steering.publish(messages.steering_to_message(self._header, speed, turn_rate))
-
-    def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        result = self.set_parameters([Parameter("enabled", value=request.data)])[0]
-        response.success = result.successful
-        response.message = result.reason or ("steers" if request.data else "stands still")
-        return response
 
 
 def main(args: list[str] | None = None) -> None:

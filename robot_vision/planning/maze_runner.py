@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
+from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping import PlanView, Pose
 from robot_vision.mapping.grid_pose import GridPose
 from robot_vision.planning.grid import Cell, PlanningError, checked_positive
@@ -91,6 +92,9 @@ class MazeRunner:
         self._pose = GridPose(begin, self.cell, self.wall * self.cell)
         self._place, self._towards, self._came = self.start, self.heading, True
         self._viewed: Pose | None = None
+        self._blind = ""
+        self._odometry = Pose(0.0, 0.0, 0.0)
+        self._plan_seen: tuple[PlanView, Pose] | None = None
         self._ahead: list[Cell] = []
         self._looks, self._caution, self._reason, self._walled_in = False, False, "", 0
         self._route = Route(_NOWHERE, 0.0, "no odometry yet")
@@ -135,6 +139,7 @@ class MazeRunner:
     def move(self, stamp_s: float, odometry: Pose) -> None:
         """Take in a pose that odometry tells, in a frame of its own."""
         self._pose.move(stamp_s, odometry)
+        self._odometry = odometry
 
     def see_directions(
         self, stamp_s: float, directions: NDArray[np.float64], sigma: NDArray[np.float64], camera: Camera
@@ -151,7 +156,8 @@ class MazeRunner:
             eye: of the camera ahead of base_link, m.
         """
         pose = self._pose.at(stamp_s)
-        if pose is None:
+        self._blind = "no odometry of the time of the picture" if pose is None else self._blindness(plan)
+        if pose is None or self._blind:
             return
         trust = self._novelty(pose)
         self._pose.see_plan(stamp_s, plan, eye, trust)
@@ -180,6 +186,8 @@ class MazeRunner:
             if self._looks:
                 reason, seen = "looks whether a wall stands there", _way(points[:-1])
             points = _up_to_turn(points)
+        if self._blind:
+            points, reason, seen = _NOWHERE, self._blind, 0.0
         self._route = Route(points, seen, reason, number=number, done=self.stage == "done")
         return self._route
 
@@ -273,13 +281,27 @@ class MazeRunner:
     def _middle(self, place: Cell) -> tuple[float, float]:
         return (place[1] + 0.5) * self.cell, (place[0] + 0.5) * self.cell
 
+    def _blindness(self, plan: PlanView) -> str:
+        """Why a plan is none to drive by; empty when it is one. No two pictures taken on the way give the same plan."""
+        if (plan.cells < 0).all():
+            return "the plan of the floor shows nothing"
+        if self._plan_seen is None or not np.array_equal(self._plan_seen[0].cells, plan.cells):
+            self._plan_seen = plan, self._odometry
+        elif self._is_elsewhere(self._odometry, self._plan_seen[1]):
+            return "the plan of the floor stays the same while the robot moves"
+        return ""
+
+    def _is_elsewhere(self, pose: Pose, before: Pose) -> bool:
+        """Whether a picture from here tells something that one from there did not."""
+        way = np.hypot(pose.x - before.x, pose.y - before.y)
+        return bool(
+            way >= _TWICE_SEEN[0] * self.cell or abs(wrap_angle(pose.yaw - before.yaw)) >= _TWICE_SEEN[1]
+        )
+
     def _novelty(self, pose: Pose) -> float:
         """Trust in a picture from here: errors of pictures from one place are the same."""
-        before = self._viewed
-        if before is not None:
-            way = np.hypot(pose.x - before.x, pose.y - before.y)
-            if way < _TWICE_SEEN[0] * self.cell and abs(pose.yaw - before.yaw) < _TWICE_SEEN[1]:
-                return _SAME_VIEW
+        if self._viewed is not None and not self._is_elsewhere(pose, self._viewed):
+            return _SAME_VIEW
         self._viewed = pose
         return 1.0
 
