@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 _QUARTER = np.pi / 2
 _YAW, _WAY, _SHADOW = 2, 3, 4
 """Places in the state: x, y (m), yaw (rad), share by which ways are longer than odometry tells, tip of shadows (m)."""
+_PLACE = slice(0, _SHADOW)
 _FOOT, _EDGE, _NEITHER = 0.55, 0.35, 0.1
 """How often floor ends at the foot of a wall, at the edge of its shadow, and anywhere within a cell."""
 _SPREAD = 0.025
@@ -165,27 +166,35 @@ class GridPose:
     def _weigh(self, face: Face, error: float, variance: float) -> Array:
         """Take in a face that lies `error` (m) farther up its axis than believed; returns the change of the state."""
         spread = (_SPREAD * self.cell) ** 2
-        shares = [_NEITHER / self.cell]
-        shifts, covariances = [np.zeros(6)], [self._covariance]
+        number = _SHADOW + face.axis
         foot = np.eye(6)[face.axis]
-        edge = foot - np.eye(6)[_SHADOW + face.axis]
-        for usual, row, left in ((_FOOT, foot, error), (_EDGE, edge, error + self._shadow[face.axis])):
-            gain, covariance = _corrected(self._covariance, row, variance)
-            likely = usual * _normal(left, float(row @ self._covariance @ row) + spread)
-            if row is edge:  # a shadow on the robot's side, or there is none to be seen
-                tip, across = self._shadow + gain[_SHADOW:] * left, _SHADOW + face.axis
-                likely *= _below(face.side * tip[face.axis], covariance[across, across])
-            shares.append(likely)
-            shifts.append(gain * left)
-            covariances.append(covariance)
-        weights = np.array(shares) / sum(shares)
-        shift = np.asarray(weights @ np.array(shifts))
-        apart = np.array(shifts) - shift
-        mixed = np.einsum("n,nij->ij", weights, np.array(covariances) + apart[:, :, None] * apart[:, None, :])
+        edge = foot - np.eye(6)[number]
+        past_edge = error + float(self._shadow[face.axis])
+        gain, covariance = _corrected(self._covariance, edge, variance)
+        tip = self._shadow[face.axis] + gain[number] * past_edge
+        likely = np.array(
+            [
+                _NEITHER / self.cell,
+                _FOOT * _normal(error, self._covariance[face.axis, face.axis] + spread),
+                # on the other side of walls there is no shadow to be seen
+                _EDGE
+                * _normal(past_edge, float(edge @ self._covariance @ edge) + spread)
+                * _below(face.side * tip, covariance[number, number]),
+            ]
+        )
+        weights = likely / likely.sum()
+        if weights[2] < 0.5:
+            # what is likelier no edge must not teach where edges are: it would draw them to the feet of the walls
+            gain, covariance = _corrected(self._covariance, edge, variance, learn=_PLACE)
+        by_foot, after_foot = _corrected(self._covariance, foot, variance)
+        shifts = np.array([np.zeros(6), by_foot * error, gain * past_edge])
+        shift = np.asarray(weights @ shifts)
+        apart = shifts - shift
+        parts = np.array([self._covariance, after_foot, covariance]) + apart[:, :, None] * apart[:, None, :]
+        self._covariance = np.einsum("n,nij->ij", weights, parts)
         least = (_SHADOW_SPREAD * self.cell) ** 2
-        for number in (_SHADOW, _SHADOW + 1):
-            mixed[number, number] = max(mixed[number, number], least)
-        self._covariance = mixed
+        for place in (_SHADOW, _SHADOW + 1):
+            self._covariance[place, place] = max(self._covariance[place, place], least)
         return shift
 
     def _grow(self, step: Pose) -> None:
@@ -216,11 +225,15 @@ class GridPose:
         self._shadow = self._shadow + shift[_SHADOW:]
 
 
-def _corrected(covariance: Array, row: Array, variance: float) -> tuple[Array, Array]:
-    """Gain (6,) and covariance (6, 6) after a measurement of `row` @ state."""
+def _corrected(
+    covariance: Array, row: Array, variance: float, learn: slice = slice(None)
+) -> tuple[Array, Array]:
+    """Gain (6,) and covariance (6, 6) after a measurement of `row` @ state from which part of the state learns."""
     ahead = covariance @ row
-    gain = ahead / (float(row @ ahead) + variance)
-    return gain, covariance - np.outer(gain, ahead)
+    gain = np.zeros(6)
+    gain[learn] = ahead[learn] / (float(row @ ahead) + variance)
+    left = np.eye(6) - np.outer(gain, row)  # Joseph's form holds for any gain
+    return gain, left @ covariance @ left.T + variance * np.outer(gain, gain)
 
 
 def _normal(value: float, variance: float) -> float:
