@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
-from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping.plan_view import PlanView
 from robot_vision.mapping.pose import Pose, PoseHistory
 from robot_vision.mapping.wall_faces import Face, faces
@@ -99,22 +98,22 @@ class GridPose:
     @property
     def pose(self) -> Pose | None:
         """Where the robot is by its latest odometry, in the maze; None before there is any."""
-        return None if self._last is None else _composed(self._origin, self._rolled)
+        return None if self._last is None else self._origin.then(self._rolled)
 
     def move(self, stamp_s: float, odometry: Pose) -> None:
         """Take in a pose that odometry tells."""
         if self._last is not None:
-            step = _composed(_inverted(self._last), odometry)
+            step = self._last.inverse.then(odometry)
             longer = 1.0 + self._way
             self._grow(step)
-            self._rolled = _composed(self._rolled, Pose(longer * step.x, longer * step.y, step.yaw))
+            self._rolled = self._rolled.then(Pose(longer * step.x, longer * step.y, step.yaw))
         self._last = odometry
         self._odometry.add(stamp_s, self._rolled)
 
     def at(self, stamp_s: float) -> Pose | None:
         """Where the robot was at a time; None where odometry is missing."""
         told = self._odometry.at(stamp_s)
-        return None if told is None else _composed(self._origin, told[0])
+        return None if told is None else self._origin.then(told[0])
 
     def see_directions(self, stamp_s: float, directions: Array, sigma: Array, camera: Camera) -> None:
         """Put the yaw right by vanishing points.
@@ -219,8 +218,8 @@ class GridPose:
         told = self._odometry.at(stamp_s)
         if told is None:
             return
-        pose = Pose(*(np.array(_composed(self._origin, told[0])) + shift[:3]).tolist())
-        self._origin = _composed(pose, _inverted(told[0]))
+        pose = Pose(*(np.array(self._origin.then(told[0])) + shift[:3]).tolist())
+        self._origin = pose.then(told[0].inverse)
         self._way += float(shift[_WAY])
         self._shadow = self._shadow + shift[_SHADOW:]
 
@@ -244,18 +243,3 @@ def _normal(value: float, variance: float) -> float:
 def _below(mean: float, variance: float) -> float:
     """Probability that something normally distributed is negative."""
     return 0.5 * (1.0 + math.erf(-mean / math.sqrt(2.0 * variance)))
-
-
-def _composed(first: Pose, then: Pose) -> Pose:
-    """A pose told in the frame of another one, in the frame of that one."""
-    cos, sin = np.cos(first.yaw), np.sin(first.yaw)
-    return Pose(
-        float(first.x + cos * then.x - sin * then.y),
-        float(first.y + sin * then.x + cos * then.y),
-        float(wrap_angle(first.yaw + then.yaw)),
-    )
-
-
-def _inverted(pose: Pose) -> Pose:
-    cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
-    return Pose(float(-cos * pose.x - sin * pose.y), float(sin * pose.x - cos * pose.y), float(-pose.yaw))

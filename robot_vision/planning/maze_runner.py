@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
-from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping import PlanView, Pose
 from robot_vision.mapping.grid_pose import GridPose
+from robot_vision.planning.fresh_sight import FreshSight
 from robot_vision.planning.grid import Cell, PlanningError, checked_positive
 from robot_vision.planning.known_maze import KnownMaze, beside
 from robot_vision.planning.maze import Maze
@@ -39,10 +39,6 @@ _MIDDLE = 0.04
 corners reach far when it turns on the spot."""
 _OFF_AXIS = 0.15
 """Cells from the middle of its cell from which the robot goes back to it before it turns off."""
-_TWICE_SEEN = 0.03, 0.05
-"""Cells of way and radians of turn after which a picture tells something new."""
-_SAME_VIEW = 0.3
-"""Trust in a picture that tells nothing new."""
 
 
 @dataclass
@@ -91,10 +87,9 @@ class MazeRunner:
         begin = Pose(*self._middle(self.start), float(np.pi / 2 * (1 - self.heading)))
         self._pose = GridPose(begin, self.cell, self.wall * self.cell)
         self._place, self._towards, self._came = self.start, self.heading, True
-        self._viewed: Pose | None = None
         self._blind = ""
         self._odometry = Pose(0.0, 0.0, 0.0)
-        self._plan_seen: tuple[PlanView, Pose] | None = None
+        self._sight = FreshSight(self.cell)
         self._ahead: list[Cell] = []
         self._looks, self._caution, self._reason, self._walled_in = False, False, "", 0
         self._route = Route(_NOWHERE, 0.0, "no odometry yet")
@@ -156,10 +151,12 @@ class MazeRunner:
             eye: of the camera ahead of base_link, m.
         """
         pose = self._pose.at(stamp_s)
-        self._blind = "no odometry of the time of the picture" if pose is None else self._blindness(plan)
+        self._blind = self._sight.fault(plan, self._odometry)
+        if pose is None:
+            self._blind = "no odometry of the time of the picture"
         if pose is None or self._blind:
             return
-        trust = self._novelty(pose)
+        trust = self._sight.trust(pose)
         self._pose.see_plan(stamp_s, plan, eye, trust)
         self._evidence.see(plan, self._pose.at(stamp_s) or pose, trust)
         self._stale = self._evidence.tell(self._known) or self._stale
@@ -280,30 +277,6 @@ class MazeRunner:
 
     def _middle(self, place: Cell) -> tuple[float, float]:
         return (place[1] + 0.5) * self.cell, (place[0] + 0.5) * self.cell
-
-    def _blindness(self, plan: PlanView) -> str:
-        """Why a plan is none to drive by; empty when it is one. No two pictures taken on the way give the same plan."""
-        if (plan.cells < 0).all():
-            return "the plan of the floor shows nothing"
-        if self._plan_seen is None or not np.array_equal(self._plan_seen[0].cells, plan.cells):
-            self._plan_seen = plan, self._odometry
-        elif self._is_elsewhere(self._odometry, self._plan_seen[1]):
-            return "the plan of the floor stays the same while the robot moves"
-        return ""
-
-    def _is_elsewhere(self, pose: Pose, before: Pose) -> bool:
-        """Whether a picture from here tells something that one from there did not."""
-        way = np.hypot(pose.x - before.x, pose.y - before.y)
-        return bool(
-            way >= _TWICE_SEEN[0] * self.cell or abs(wrap_angle(pose.yaw - before.yaw)) >= _TWICE_SEEN[1]
-        )
-
-    def _novelty(self, pose: Pose) -> float:
-        """Trust in a picture from here: errors of pictures from one place are the same."""
-        if self._viewed is not None and not self._is_elsewhere(pose, self._viewed):
-            return _SAME_VIEW
-        self._viewed = pose
-        return 1.0
 
 
 def _up_to_turn(points: NDArray[np.float64]) -> NDArray[np.float64]:
