@@ -46,7 +46,7 @@ class FreshSight:
         """
         if (plan.cells < 0).all():
             return "the plan of the floor shows nothing"
-        if self._first_seen is None or not np.array_equal(self._cells, plan.cells):
+        if self._cells is None or self._first_seen is None or not np.array_equal(self._cells, plan.cells):
             self._cells, self._first_seen = plan.cells, odometry
         elif self._is_elsewhere(odometry, self._first_seen):
             return "the plan of the floor stays the same while the robot moves"
