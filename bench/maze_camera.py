@@ -9,6 +9,7 @@ start and the goal cells are known, as in a contest. Whether the robot was where
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -138,7 +139,7 @@ def explore(maze: Maze, seed: int = SEED, cell: float = CELL_M, look: Look = by_
     perfect = MazeExplorer(maze).explore()
     readings, track, worst = [STANDING], [maze.start], 0.0
     most = MOST_S_PER_CELL * (perfect.steps_home + len(perfect.shortest_path))
-    number = 0
+    number, stage = 0, mouse.runner.stage
     while drive.time_ns < most * 1e9 and not drive.score.contacts:
         mouse.move(readings)
         now, state = drive.time_ns * 1e-9, drive.state
@@ -152,6 +153,9 @@ def explore(maze: Maze, seed: int = SEED, cell: float = CELL_M, look: Look = by_
         pose = mouse.runner.pose
         if pose is not None:
             worst = max(worst, float(np.hypot(pose.x - state.x, pose.y - state.y)))
+        if mouse.runner.stage != stage:
+            stage = mouse.runner.stage
+            _tell(maze, mouse.runner, drive, worst)
         if mouse.runner.stage == "done" and told == (0.0, 0.0) and abs(state.speed) < 0.01:
             break
         drive.steer(*told, drive.time_ns)
@@ -172,6 +176,15 @@ def explore(maze: Maze, seed: int = SEED, cell: float = CELL_M, look: Look = by_
         time_s=drive.time_ns * 1e-9,
         perfect=perfect,
     )
+
+
+def _tell(maze: Maze, runner: MazeRunner, drive: LiveDrive, worst_m: float) -> None:
+    """Say how far a run has got: the large ones take minutes."""
+    room_m = float(drive.summary()["closest_m"] or 0.0)
+    rows, columns = maze.size
+    text = f"{rows} x {columns}, {drive.time_ns * 1e-9:.0f} s: {runner.summary}; "
+    text += f"place at most {1e3 * worst_m:.0f} mm wrong, least room {1e3 * room_m:.0f} mm"
+    print(text, file=sys.stderr, flush=True)
 
 
 def _cell_after(cell: tuple[int, int], x: float, y: float) -> tuple[int, int]:

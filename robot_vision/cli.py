@@ -86,9 +86,11 @@ def demo(
     height: Annotated[float, typer.Option(help="Of the camera over the ground, m.")] = 0.6,
     pitch: Annotated[float, typer.Option(help="Of the camera, degrees; down is positive.")] = 5.0,
     live: Annotated[
-        Optional[str], typer.Option(help="A world to drive through live instead, such as corridor.")
+        Optional[str], typer.Option(help="A world to drive through live instead: corridor, road, maze, …")
     ] = None,
-    seconds: Annotated[float, typer.Option(help="How long, of a live drive.")] = 20.0,
+    seconds: Annotated[
+        Optional[float], typer.Option(help="How long, of a live drive [20; a maze: 300].")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of a live drive.")] = 1,
 ) -> None:
     """Replay a recorded drive through the real nodes, or let them drive, and show what they made of it."""
@@ -99,13 +101,19 @@ def demo(
     from robot_vision.demo import Mount, run_demo
     from robot_vision.places import shared_file
 
+    console = Console(highlight=False, soft_wrap=True)
+    if live == "maze":
+        from robot_vision.demo.maze_drive import run_maze
+
+        run_maze(out, seconds or 300.0, seed, console)
+        return
     if live is not None:
         from robot_vision.demo.live_drive import run_live
 
-        run_live(live, out, seconds, seed, Console(highlight=False, soft_wrap=True))
+        run_live(live, out, seconds or 20.0, seed, console)
         return
     drive = shared_file("bags/corridor.mcap") if bag is None else bag
-    run_demo(drive, out, Mount(height, math.radians(pitch)), Console(highlight=False, soft_wrap=True))
+    run_demo(drive, out, Mount(height, math.radians(pitch)), console)
 
 
 @app.command()

@@ -212,6 +212,19 @@ def test_the_live_demonstration_drives_and_leaves_the_same_things(tmp_path: Path
     assert {"/heading", "/steering", "/truth/heading", "/truth/map", "/odom"} <= set(topics)
 
 
+def test_the_maze_demonstration_explores_and_draws_what_it_knows(tmp_path: Path) -> None:
+    run = robot_vision("demo", "--live", "maze", "--seed", "5", "--seconds", "4", "--out", tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "looks for the goal" in run.stdout
+    assert "not run to its end within 4 s" in run.stdout and "touched" not in run.stdout
+    assert {path.name for path in tmp_path.iterdir()} == {"demo.png", "demo.mcap"}
+    topics = BagReader(tmp_path / "demo.mcap").topics
+    assert topics["/steering"].count >= 20
+    assert {"/maze", "/pose", "/plan_view", "/truth/odom"} <= set(topics)
+    drawn = cv2.imread(str(tmp_path / "demo.png"))
+    assert drawn.shape[0] == 480 and drawn.shape[1] > 640 + 400
+
+
 @pytest.mark.parametrize(
     ("setting", "words"), [("width", "width=2.4"), ("width=wide", "width must be a number, not 'wide'")]
 )

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from robot_vision.bags.messages import stamp_ns, yaw_of
 from robot_vision.demo.show import NODES, present
@@ -76,19 +77,40 @@ def run_live(world: str, out: Path, seconds: float, seed: int, console: Console)
                 "wait_timeout": START_S,
             },
         )
-        _watch(simulator, [recorder, *nodes], int(graph.environment["ROS_DOMAIN_ID"]), console)
+        domain = int(graph.environment["ROS_DOMAIN_ID"])
+        watch(_Status(), simulator, [recorder, *nodes], domain, console)
     if simulator.returncode == TOUCHED:
         console.print("[red]the robot has touched something[/]")
     present(bag, bag, out, console)
+
+
+class Watcher(Protocol):
+    """What is told of a drive, as one line (`str`), and when it is over."""
+
+    stamp_ns: int
+    over: bool
+
+    def topics(self) -> list[tuple[type, str, Callable[[Any], None]]]:
+        """Type, name and who hears it of each topic."""
 
 
 class _Status:
     """The newest heading, its truth and the steering, as one line."""
 
     def __init__(self) -> None:
-        self.stamp_ns = START_NS
+        self.stamp_ns, self.over = START_NS, False
         self._heading = self._truth = self._steering = "none yet"
         self._truths: dict[int, str] = {}
+
+    def topics(self) -> list[tuple[type, str, Callable[[Any], None]]]:
+        """See `Watcher`."""
+        from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
+
+        return [
+            (PoseWithCovarianceStamped, "heading", self.hear_heading),
+            (PoseWithCovarianceStamped, "truth/heading", self.hear_truth),
+            (TwistStamped, "steering", self.hear_steering),
+        ]
 
     def hear_heading(self, message: Any) -> None:
         """Take what the nodes found."""
@@ -117,10 +139,22 @@ def _lane_text(message: Any) -> str:
     return f"{math.degrees(yaw_of(pose.orientation)):+6.2f}° {100 * pose.position.y:+6.1f} cm"
 
 
-def _watch(simulator: NodeProcess, others: list[NodeProcess], domain: int, console: Console) -> None:
-    """Show one line that changes, or on a console that is none a line a second, until the drive ends."""
+def watch(
+    status: Watcher, simulator: NodeProcess, others: list[NodeProcess], domain: int, console: Console
+) -> None:
+    """Show one line that changes, or on a console that is none a line a second, until the drive ends.
+
+    Args:
+        status: hears what is told.
+        simulator: the drive ends with it, or when the status says so: then it is stopped.
+        others: nodes that must not end before.
+        domain: of the graph.
+        console: where it is told.
+
+    Raises:
+        ProcessError: a node ended before the drive did, or the simulator failed.
+    """
     import rclpy
-    from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions
@@ -134,14 +168,12 @@ def _watch(simulator: NodeProcess, others: list[NodeProcess], domain: int, conso
     node = rclpy.create_node("watcher", context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
-    status = _Status()
-    node.create_subscription(PoseWithCovarianceStamped, "heading", status.hear_heading, NEWEST)
-    node.create_subscription(PoseWithCovarianceStamped, "truth/heading", status.hear_truth, NEWEST)
-    node.create_subscription(TwistStamped, "steering", status.hear_steering, NEWEST)
+    for kind, topic, callback in status.topics():
+        node.create_subscription(kind, topic, callback, NEWEST)
     told_ns = START_NS
     try:
         with console.status("starting; the first time kernels are compiled") as line:
-            while simulator.running:
+            while simulator.running and not status.over:
                 executor.spin_once(timeout_sec=_WAIT_S)
                 if status.stamp_ns > START_NS:
                     line.update(str(status))
@@ -154,7 +186,8 @@ def _watch(simulator: NodeProcess, others: list[NodeProcess], domain: int, conso
         node.destroy_node()
         executor.shutdown()
         context.try_shutdown()
-    if simulator.wait(_WAIT_S) not in (0, TOUCHED):
+    code = simulator.stop() if status.over else simulator.wait(_WAIT_S)
+    if code not in (0, TOUCHED):
         raise ProcessError(
             "\n".join(["the drive failed; the log of simulator ends with:", *simulator.log[-20:]])
         )

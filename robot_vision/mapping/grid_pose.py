@@ -3,41 +3,55 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
-from robot_vision.geometry.rotation import wrap_angle
-from robot_vision.mapping.plan_view import FREE, OCCUPIED, PlanView
+from robot_vision.mapping.plan_view import PlanView
 from robot_vision.mapping.pose import Pose, PoseHistory
+from robot_vision.mapping.wall_faces import Face, faces
 
 Array = NDArray[np.float64]
 
 _QUARTER = np.pi / 2
-_NEARER, _FARTHER, _RAMP = 0.04, 0.08, 0.03
-"""Cells by which a face may lie nearer or farther than believed and count in full, and over which it loses that: floor
-may seem to end at the wall's shadow, and where it goes on past the end of a wall another one's face may be taken for
-the same."""
-_DOUBTED = 4.0
-"""Factor on the deviation of faces beyond that."""
+_YAW, _WAY, _SHADOW = 2, 3, 4
+"""Places in the state: x, y (m), yaw (rad), share by which ways are longer than odometry tells, tip of shadows (m)."""
+_PLACE = slice(0, _SHADOW)
+_FOOT, _EDGE, _NEITHER = 0.55, 0.35, 0.1
+"""How often floor ends at the foot of a wall, at the edge of its shadow, and anywhere within a cell."""
+_SPREAD = 0.025
+"""Standard deviation of where floor is seen to end, cells. It tells foot from edge. Pictures one after the other err
+alike, which is why a face puts the place right by less than this would have it (`face_sigma`)."""
+_SHADOW_LENGTH, _SHADOW_SPREAD = 0.15, 0.03
+"""Standard deviations, cells: of the shadow before any is seen, and of where its soft edge is taken to be."""
+_SIDEWAYS = 0.01
+"""Standard deviation of what a way goes astray beside its length, share of it."""
+_LOST = 0.3
+"""Standard deviation of place (cells) and yaw (rad) beyond which the grid tells nothing more."""
 
 
 @dataclass
 class GridPose:
-    """Follows a robot through a maze of square cells (three Kalman filters: x, y and yaw).
+    """Follows a robot through a maze of square cells: an extended Kalman filter whose faces of walls are ambiguous.
 
     Vanishing points of the walls tell the yaw up to quarter turns. Where a plan of the floor shows faces of walls,
     these lie half a wall's thickness beside a line of the grid, which tells the place across them up to whole cells.
     Odometry, which drifts, tells which quarter and which cell.
+
+    Floor may seem to end at the edge of a wall's shadow. Walls of one height in one light cast shadows that reach
+    equally far, on the same side of all of them: how far is learnt with the place. Each face is weighed as the foot of
+    a wall, as the edge of a shadow and as neither, and the answer is the mean of the three (probabilistic data
+    association; Bar-Shalom, Daum and Huang 2009, "The probabilistic data association filter").
 
     Args:
         start: where the robot is at its first odometry: x to the east, y to the north, m; yaw from east, rad.
         cell: side of a cell, m.
         wall: thickness of the walls, m.
         reach: how far walls are used, m; None: two cells.
-        way_drift: standard deviation of odometry's way, share of it.
+        way_drift: standard deviation of odometry's way, share of it; it is learnt, too.
         turn_drift: standard deviation of its turns, share of them.
         direction_floor: what the vanishing points of one picture can tell of the yaw at best, rad.
         face_sigma: standard deviation of the place of a face in one plan, share of the cell.
@@ -56,43 +70,50 @@ class GridPose:
     face_sigma: float = 0.08
     _odometry: PoseHistory = field(default_factory=PoseHistory, init=False, repr=False)
     _last: Pose | None = field(default=None, init=False, repr=False)
+    _rolled: Pose = field(default=Pose(0.0, 0.0, 0.0), init=False, repr=False)
     _origin: Pose = field(init=False, repr=False)
-    _variance: Array = field(init=False, repr=False)
+    _way: float = field(default=0.0, init=False, repr=False)
+    _shadow: Array = field(init=False, repr=False)
+    _covariance: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("cell", "wall", "way_drift", "turn_drift", "direction_floor", "face_sigma"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} must be a positive number, not {value}")
-        self._variance = np.array([(0.02 * self.cell) ** 2, (0.02 * self.cell) ** 2, 0.05**2])
+        self._origin, self._shadow = self.start, np.zeros(2)
+        place, shadow = 0.02 * self.cell, _SHADOW_LENGTH * self.cell
+        self._covariance = np.diag(np.square([place, place, 0.05, self.way_drift, shadow, shadow]))
 
     @property
     def sigma(self) -> Array:
         """Standard deviations (3,) of x and y (m) and yaw (rad)."""
-        return np.sqrt(self._variance)
+        return np.sqrt(np.diag(self._covariance)[:3])
+
+    @property
+    def shadow(self) -> Array:
+        """From a wall to the edge of its shadow: (2,) m to the east and to the north, as learnt by now."""
+        return self._shadow.copy()
 
     @property
     def pose(self) -> Pose | None:
         """Where the robot is by its latest odometry, in the maze; None before there is any."""
-        return None if self._last is None else _composed(self._origin, self._last)
+        return None if self._last is None else self._origin.then(self._rolled)
 
     def move(self, stamp_s: float, odometry: Pose) -> None:
         """Take in a pose that odometry tells."""
-        if self._last is None:
-            self._origin = _composed(self.start, _inverted(odometry))
-        else:
-            way = float(np.hypot(odometry.x - self._last.x, odometry.y - self._last.y))
-            turn = abs(wrap_angle(odometry.yaw - self._last.yaw))
-            # errors of a share add up while the robot goes on in one way: they grow with the way, not its root
-            grown = self.sigma + np.array([self.way_drift * way] * 2 + [self.turn_drift * turn])
-            self._variance = np.minimum(grown**2, [(0.3 * self.cell) ** 2] * 2 + [0.3**2])
+        if self._last is not None:
+            step = self._last.inverse.then(odometry)
+            longer = 1.0 + self._way
+            self._grow(step)
+            self._rolled = self._rolled.then(Pose(longer * step.x, longer * step.y, step.yaw))
         self._last = odometry
-        self._odometry.add(stamp_s, odometry)
+        self._odometry.add(stamp_s, self._rolled)
 
     def at(self, stamp_s: float) -> Pose | None:
         """Where the robot was at a time; None where odometry is missing."""
         told = self._odometry.at(stamp_s)
-        return None if told is None else _composed(self._origin, told[0])
+        return None if told is None else self._origin.then(told[0])
 
     def see_directions(self, stamp_s: float, directions: Array, sigma: Array, camera: Camera) -> None:
         """Put the yaw right by vanishing points.
@@ -111,8 +132,15 @@ class GridPose:
         off = -np.arctan2(base[level, 1], base[level, 0]) - pose.yaw
         off = np.mod(off + _QUARTER / 2, _QUARTER) - _QUARTER / 2
         variances = np.maximum(sigma[level], self.direction_floor) ** 2
+        row = np.eye(6)[_YAW]
+        told = 0.0
         for error, variance in zip(off, variances, strict=True):
-            self._correct(stamp_s, 2, float(error), float(variance))
+            left = float(error) - told
+            if left**2 > 16.0 * (self._covariance[_YAW, _YAW] + variance):
+                continue
+            gain, self._covariance = _corrected(self._covariance, row, float(variance))
+            told += gain[_YAW] * left
+            self._shift(stamp_s, gain * left)
 
     def see_plan(self, stamp_s: float, plan: PlanView, eye: float, trust: float = 1.0) -> None:
         """Put the place right by the faces of walls in a plan of the floor.
@@ -126,101 +154,92 @@ class GridPose:
         pose = self.at(stamp_s)
         if pose is None:
             return
-        ends = floor_ends(plan, eye, self.reach or 2.0 * self.cell)
-        cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
-        turned = ends @ np.array([[cos, sin], [-sin, cos]])
-        for axis in (0, 1):
-            for side in (-1.0, 1.0):
-                short = self._face_error(turned, axis, side, pose)
-                if short is not None:
-                    sigma = self.face_sigma * self.cell * _doubt(short / self.cell)
-                    self._correct(stamp_s, axis, side * short, sigma**2 / trust)
+        found = faces(plan, pose, eye, self.reach or 2.0 * self.cell, self.cell, self.wall)
+        told = np.zeros(2)
+        for face in found:
+            left = face.side * face.nearer - told[face.axis]
+            shift = self._weigh(face, left, (self.face_sigma * self.cell) ** 2 / trust)
+            told += shift[:2]
+            self._shift(stamp_s, shift)
 
-    def _face_error(self, ends: Array, axis: int, side: float, pose: Pose) -> float | None:
-        """By how much the faces of walls across an axis lie nearer than the grid's lines; None without any.
+    def _weigh(self, face: Face, error: float, variance: float) -> Array:
+        """Take in a face that lies `error` (m) farther up its axis than believed; returns the change of the state."""
+        spread = (_SPREAD * self.cell) ** 2
+        number = _SHADOW + face.axis
+        foot = np.eye(6)[face.axis]
+        edge = foot - np.eye(6)[number]
+        past_edge = error + float(self._shadow[face.axis])
+        gain, covariance = _corrected(self._covariance, edge, variance)
+        tip = self._shadow[face.axis] + gain[number] * past_edge
+        likely = np.array(
+            [
+                _NEITHER / self.cell,
+                _FOOT * _normal(error, self._covariance[face.axis, face.axis] + spread),
+                # on the other side of walls there is no shadow to be seen
+                _EDGE
+                * _normal(past_edge, float(edge @ self._covariance @ edge) + spread)
+                * _below(face.side * tip, covariance[number, number]),
+            ]
+        )
+        weights = likely / likely.sum()
+        if weights[2] < 0.5:
+            # what is likelier no edge must not teach where edges are: it would draw them to the feet of the walls
+            gain, covariance = _corrected(self._covariance, edge, variance, learn=_PLACE)
+        by_foot, after_foot = _corrected(self._covariance, foot, variance)
+        shifts = np.array([np.zeros(6), by_foot * error, gain * past_edge])
+        shift = np.asarray(weights @ shifts)
+        apart = shifts - shift
+        parts = np.array([self._covariance, after_foot, covariance]) + apart[:, :, None] * apart[:, None, :]
+        self._covariance = np.einsum("n,nij->ij", weights, parts)
+        least = (_SHADOW_SPREAD * self.cell) ** 2
+        for place in (_SHADOW, _SHADOW + 1):
+            self._covariance[place, place] = max(self._covariance[place, place], least)
+        return shift
 
-        Args:
-            ends: (K, 2) of the floor relative to the robot, turned into the maze, in the order of their bearing;
-                nan where it does not end.
-            axis: 0 or 1.
-            side: of the robot where the faces are: 1 up the axis, -1 down it.
-            pose: believed, of the robot.
-        """
-        step = np.full_like(ends, np.nan)
-        step[2:-2] = ends[4:] - ends[:-4]
-        with np.errstate(invalid="ignore"):
-            across = (np.abs(step[:, axis]) < 0.25 * np.abs(step[:, 1 - axis])) & (
-                np.abs(step[:, 1 - axis]) < 0.6 * self.cell
-            )
-            across &= ends[:, axis] * side > 0.0
-        faces = ends[across, axis]
-        if len(faces) < 5:
-            return None
-        lines = (faces + side * self.wall / 2 + (pose.x, pose.y)[axis]) / self.cell
-        short = side * (np.round(lines) - lines) * self.cell
-        middle = float(np.median(short))
-        near = np.abs(short - middle) < 0.08 * self.cell
-        if near.sum() < 5 or near.mean() < 0.5 or abs(middle) > 0.3 * self.cell:
-            return None
-        return float(short[near].mean())
+    def _grow(self, step: Pose) -> None:
+        """Grow the covariance by a step (m, in base_link) of odometry."""
+        yaw = self._origin.yaw + self._rolled.yaw
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        x, y = cos * step.x - sin * step.y, sin * step.x + cos * step.y
+        forward = np.eye(6)
+        forward[:2, _YAW], forward[:2, _WAY] = (-y, x), (x, y)
+        grown = forward @ self._covariance @ forward.T
+        # errors of a share add up while the robot goes on in one way: they grow with the way, not its root
+        more = np.array([*[_SIDEWAYS * np.hypot(x, y)] * 2, self.turn_drift * abs(step.yaw)])
+        sigma = np.sqrt(np.diag(grown)[:3])
+        grown[np.arange(3), np.arange(3)] = (sigma + more) ** 2
+        most = np.array([_LOST * self.cell, _LOST * self.cell, _LOST])
+        less = np.ones(6)
+        less[:3] = np.minimum(most / (sigma + more), 1.0)
+        self._covariance = grown * np.outer(less, less)
 
-    def _correct(self, stamp_s: float, axis: int, error: float, variance: float) -> None:
-        """Take in a measurement of x (0), y (1) or yaw (2) that differs from what is believed by `error`."""
+    def _shift(self, stamp_s: float, shift: Array) -> None:
+        """Change the state (6,); the pose is that of a time."""
         told = self._odometry.at(stamp_s)
-        believed = self._variance[axis]
-        if told is None or error**2 > 16.0 * (believed + variance):
+        if told is None:
             return
-        gain = believed / (believed + variance)
-        self._variance[axis] = (1.0 - gain) * believed
-        pose = _composed(self._origin, told[0])
-        moved = np.array(pose)
-        moved[axis] += gain * error
-        self._origin = _composed(Pose(*moved.tolist()), _inverted(told[0]))
+        pose = Pose(*(np.array(self._origin.then(told[0])) + shift[:3]).tolist())
+        self._origin = pose.then(told[0].inverse)
+        self._way += float(shift[_WAY])
+        self._shadow = self._shadow + shift[_SHADOW:]
 
 
-def _doubt(short: float) -> float:
-    """Factor on the deviation of a face that lies `short` cells nearer than believed."""
-    beyond = abs(short) - (_NEARER if short > 0.0 else _FARTHER)
-    return 1.0 + (_DOUBTED - 1.0) * min(max(beyond / _RAMP, 0.0), 1.0)
+def _corrected(
+    covariance: Array, row: Array, variance: float, learn: slice = slice(None)
+) -> tuple[Array, Array]:
+    """Gain (6,) and covariance (6, 6) after a measurement of `row` @ state from which part of the state learns."""
+    ahead = covariance @ row
+    gain = np.zeros(6)
+    gain[learn] = ahead[learn] / (float(row @ ahead) + variance)
+    left = np.eye(6) - np.outer(gain, row)  # Joseph's form holds for any gain
+    return gain, left @ covariance @ left.T + variance * np.outer(gain, gain)
 
 
-def floor_ends(plan: PlanView, eye: float, reach: float, rays: int = 91) -> Array:
-    """Where the floor ends in a plan, bearing by bearing from right to left; (rays, 2) m in base_link, nan where not.
-
-    Args:
-        plan: in base_link.
-        eye: of the camera ahead of base_link, m.
-        reach: farthest end looked for, m.
-        rays: bearings from -45 to 45 degrees.
-    """
-    bearings = np.linspace(-np.pi / 4, np.pi / 4, rays)[:, None]
-    ranges = np.arange(0.0, reach, plan.resolution / 4)
-    x, y = eye + ranges * np.cos(bearings), ranges * np.sin(bearings)
-    column = np.floor((x - plan.origin[0]) / plan.resolution).astype(np.int64)
-    row = np.floor((y - plan.origin[1]) / plan.resolution).astype(np.int64)
-    rows, columns = plan.cells.shape
-    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    cells = np.where(inside, plan.cells[np.where(inside, row, 0), np.where(inside, column, 0)], -1)
-    taken, free = cells >= OCCUPIED, cells == FREE
-    first = np.argmax(taken, axis=1)
-    numbers = np.arange(len(ranges))
-    last = np.max(np.where(free & (numbers < first[:, None]), numbers, -1), axis=1)
-    # floor that was seen up to what ends it: else the end may be nearer than the picture's lower edge
-    good = taken.any(axis=1) & (last >= 0) & (ranges[first] - ranges[last] < 2.5 * plan.resolution)
-    end = np.where(good, (ranges[first] + ranges[last]) / 2, np.nan)[:, None]
-    return np.concatenate([eye + end * np.cos(bearings), end * np.sin(bearings)], axis=1)
+def _normal(value: float, variance: float) -> float:
+    """Density of a normal distribution about 0."""
+    return math.exp(-0.5 * value**2 / variance) / math.sqrt(2.0 * math.pi * variance)
 
 
-def _composed(first: Pose, then: Pose) -> Pose:
-    """A pose told in the frame of another one, in the frame of that one."""
-    cos, sin = np.cos(first.yaw), np.sin(first.yaw)
-    return Pose(
-        float(first.x + cos * then.x - sin * then.y),
-        float(first.y + sin * then.x + cos * then.y),
-        float(wrap_angle(first.yaw + then.yaw)),
-    )
-
-
-def _inverted(pose: Pose) -> Pose:
-    cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
-    return Pose(float(-cos * pose.x - sin * pose.y), float(sin * pose.x - cos * pose.y), float(-pose.yaw))
+def _below(mean: float, variance: float) -> float:
+    """Probability that something normally distributed is negative."""
+    return 0.5 * (1.0 + math.erf(-mean / math.sqrt(2.0 * variance)))

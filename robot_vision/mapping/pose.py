@@ -27,6 +27,21 @@ class Pose(NamedTuple):
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.array([[cos, -sin, self.x], [sin, cos, self.y], [0.0, 0.0, 1.0]])
 
+    @property
+    def inverse(self) -> Pose:
+        """Pose of odom in base_link."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose(-cos * self.x - sin * self.y, sin * self.x - cos * self.y, -self.yaw)
+
+    def then(self, pose: Pose) -> Pose:
+        """A pose told in the frame of this one, in the frame that this one is told in."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose(
+            float(self.x + cos * pose.x - sin * pose.y),
+            float(self.y + sin * pose.x + cos * pose.y),
+            float(wrap_angle(self.yaw + pose.yaw)),
+        )
+
     def to_here(self, later: Pose) -> NDArray[np.float64]:
         """(3, 3) from ground points of a later base_link to those of this one."""
         return np.asarray(np.linalg.solve(self.matrix, later.matrix))

@@ -4,7 +4,8 @@
 The maze has square cells of known side; its size, the start and the goal cells are known, no wall is. Each plan is
 answered by `steering` with its stamp. `maze` and `pose` tell what is known of the maze and where the robot believes to
 be, in the frame `maze`: x to the east, y to the north, from the corner where the outer walls meet in the south-west.
-When it tells the robot to stand still, is told in `ros/steering.py`.
+The robot stands while plans show nothing, while they stay the same although it moves, and without odometry. What else
+makes it stand is told in `ros/steering.py`.
 """
 
 from __future__ import annotations
@@ -126,44 +127,44 @@ class MazeRunnerNode(SteeringNode):
         for subscription in (self._camera_info, self._odom, self._points):
             self.catch_up(subscription)
         self._header = message.header
+        self._watch.reset()
         camera = self._calibration.camera
         if camera is None:
             self.stand_still()
             cause = f"no direction without a calibration: {self._calibration.fault}"
             self.complain("camera_info", cause, calibration.ADVICE)
             return
-        stamp_s = 1e-9 * stamp_ns(message.header.stamp)
-        self._runner.see_plan(stamp_s, plan, camera.x_m)
-        self._drive(message.header, stamp_s)
+        now_ns = stamp_ns(message.header.stamp)
+        self._runner.see_plan(1e-9 * now_ns, plan, camera.x_m)
+        self._tell(message.header)
+        if self._enabled:
+            self._drive(message.header, now_ns)
         self.answered(message.header.stamp, began)
 
-    def _drive(self, header: Header, stamp_s: float) -> None:
+    def _tell(self, header: Header) -> None:
+        """Publish where the robot is, and way and maze where they are not what they were."""
         route, pose = self._runner.route(), self._runner.pose
-        if pose is None:
-            self.stand_still()
-            self.diagnostics.report(Level.WARN, f"stands still: {route.reason}", "look what says odom")
-            return
-        self._pose.publish(maps.place_to_message(header, pose, self._runner.sigma, FRAME))
+        if pose is not None:
+            self._pose.publish(maps.place_to_message(header, pose, self._runner.sigma, FRAME))
         if route.number != self._told:
             self._told = route.number
             self._path.publish(messages.path_to_message(header, route.points, FRAME))
             seen = maps.maze_to_message(header, self._runner.seen, self.settings["cell"], FRAME)
             self._maze.publish(seen)
-        if not self._enabled:
-            return
-        self._watch.reset()
-        old = self.refusal_of_age(stamp_ns(header.stamp))
-        if old:
+
+    def _drive(self, header: Header, now_ns: int) -> None:
+        route, pose = self._runner.route(), self._runner.pose
+        refusal = self.refusal_of_age(now_ns) or (route.reason if pose is None else "")
+        if refusal or pose is None:
             self.stand_still()
-            self.diagnostics.report(Level.WARN, f"stands still: {old}", self.ADVICE)
+            self.diagnostics.report(Level.WARN, f"stands still: {refusal}", "look what says odom")
             return
         place = pose.x, pose.y, pose.yaw
-        steering = self._pursuit.update(route.points, place, stamp_s, route.seen)
+        steering = self._pursuit.update(route.points, place, 1e-9 * now_ns, route.seen)
         self.obey(steering.speed, steering.turn_rate)
         if not len(route.points):
-            self.diagnostics.report(
-                Level.WARN, f"stands still: {route.reason}", "turn the robot, or start anew"
-            )
+            level = Level.OK if route.done else Level.WARN
+            self.diagnostics.report(level, f"stands still: {route.reason}", f"{self.ADVICE}, or start anew")
             return
         self.diagnostics.report(Level.OK, self._runner.summary)
         if self._runner.stage != self._stage:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.mapping import PlanView, Pose
 from robot_vision.mapping.grid_pose import GridPose
+from robot_vision.planning.fresh_sight import FreshSight
 from robot_vision.planning.grid import Cell, PlanningError, checked_positive
 from robot_vision.planning.known_maze import KnownMaze, beside
 from robot_vision.planning.maze import Maze
@@ -38,10 +39,6 @@ _MIDDLE = 0.04
 corners reach far when it turns on the spot."""
 _OFF_AXIS = 0.15
 """Cells from the middle of its cell from which the robot goes back to it before it turns off."""
-_TWICE_SEEN = 0.03, 0.05
-"""Cells of way and radians of turn after which a picture tells something new."""
-_SAME_VIEW = 0.3
-"""Trust in a picture that tells nothing new."""
 
 
 @dataclass
@@ -90,7 +87,9 @@ class MazeRunner:
         begin = Pose(*self._middle(self.start), float(np.pi / 2 * (1 - self.heading)))
         self._pose = GridPose(begin, self.cell, self.wall * self.cell)
         self._place, self._towards, self._came = self.start, self.heading, True
-        self._viewed: Pose | None = None
+        self._blind = ""
+        self._odometry = Pose(0.0, 0.0, 0.0)
+        self._sight = FreshSight(self.cell)
         self._ahead: list[Cell] = []
         self._looks, self._caution, self._reason, self._walled_in = False, False, "", 0
         self._route = Route(_NOWHERE, 0.0, "no odometry yet")
@@ -135,6 +134,7 @@ class MazeRunner:
     def move(self, stamp_s: float, odometry: Pose) -> None:
         """Take in a pose that odometry tells, in a frame of its own."""
         self._pose.move(stamp_s, odometry)
+        self._odometry = odometry
 
     def see_directions(
         self, stamp_s: float, directions: NDArray[np.float64], sigma: NDArray[np.float64], camera: Camera
@@ -151,9 +151,12 @@ class MazeRunner:
             eye: of the camera ahead of base_link, m.
         """
         pose = self._pose.at(stamp_s)
+        self._blind = self._sight.fault(plan, self._odometry)
         if pose is None:
+            self._blind = "no odometry of the time of the picture"
+        if pose is None or self._blind:
             return
-        trust = self._novelty(pose)
+        trust = self._sight.trust(pose)
         self._pose.see_plan(stamp_s, plan, eye, trust)
         self._evidence.see(plan, self._pose.at(stamp_s) or pose, trust)
         self._stale = self._evidence.tell(self._known) or self._stale
@@ -180,6 +183,8 @@ class MazeRunner:
             if self._looks:
                 reason, seen = "looks whether a wall stands there", _way(points[:-1])
             points = _up_to_turn(points)
+        if self._blind:
+            points, reason, seen = _NOWHERE, self._blind, 0.0
         self._route = Route(points, seen, reason, number=number, done=self.stage == "done")
         return self._route
 
@@ -272,16 +277,6 @@ class MazeRunner:
 
     def _middle(self, place: Cell) -> tuple[float, float]:
         return (place[1] + 0.5) * self.cell, (place[0] + 0.5) * self.cell
-
-    def _novelty(self, pose: Pose) -> float:
-        """Trust in a picture from here: errors of pictures from one place are the same."""
-        before = self._viewed
-        if before is not None:
-            way = np.hypot(pose.x - before.x, pose.y - before.y)
-            if way < _TWICE_SEEN[0] * self.cell and abs(pose.yaw - before.yaw) < _TWICE_SEEN[1]:
-                return _SAME_VIEW
-        self._viewed = pose
-        return 1.0
 
 
 def _up_to_turn(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,15 +98,15 @@ class Vehicle:
         Raises:
             SimulationError: a command that is not finite.
         """
-        if not (np.isfinite(speed) and np.isfinite(turn_rate)):
+        if not (math.isfinite(speed) and math.isfinite(turn_rate)):
             raise SimulationError(f"vehicle: cannot drive {speed} m/s and turn {turn_rate} rad/s")
         able = self.settings
-        wanted = float(np.clip(speed, -able.most_speed, able.most_speed))
+        wanted = _within(speed, able.most_speed)
         self.speed = self._towards(self.speed, wanted, able.most_acceleration, seconds)
         if able.kind == "ackermann":
             self._steer(wanted, turn_rate, seconds)
         else:
-            turn = float(np.clip(turn_rate, -able.most_turn_rate, able.most_turn_rate))
+            turn = _within(turn_rate, able.most_turn_rate)
             self.turn_rate = self._towards(self.turn_rate, turn, able.most_turn_acceleration, seconds)
         self._roll(seconds)
 
@@ -119,21 +120,27 @@ class Vehicle:
         angle = float(np.arctan2(able.wheelbase * turn_rate * np.sign(speed or 1.0), max(abs(speed), 1e-6)))
         if speed == 0.0:
             angle = self.steering_angle  # who stands has no reason to turn the wheels
-        angle = float(np.clip(angle, -able.most_steering_angle, able.most_steering_angle))
+        angle = _within(angle, able.most_steering_angle)
         self.steering_angle = self._towards(self.steering_angle, angle, able.most_steering_rate, seconds)
         self.turn_rate = self.speed * float(np.tan(self.steering_angle)) / able.wheelbase
 
     def _towards(self, value: float, wanted: float, most_rate: float, seconds: float) -> float:
         """First-order lag with a limited rate of change."""
-        share = 1.0 if self.settings.lag == 0 else -float(np.expm1(-seconds / self.settings.lag))
+        share = 1.0 if self.settings.lag == 0 else -math.expm1(-seconds / self.settings.lag)
         change = (wanted - value) * share
-        return value + float(np.clip(change, -most_rate * seconds, most_rate * seconds))
+        return value + _within(change, most_rate * seconds)
 
     def _roll(self, seconds: float) -> None:
         """Move along the arc of constant twist: its chord has length v dt sinc(w dt / 2)."""
         turn = self.turn_rate * seconds
-        chord = self.speed * seconds * float(np.sinc(turn / 2 / np.pi))
-        self.x += chord * float(np.cos(self.yaw + turn / 2))
-        self.y += chord * float(np.sin(self.yaw + turn / 2))
+        shorter = math.sin(turn / 2) / (turn / 2) if turn else 1.0
+        chord = self.speed * seconds * shorter
+        self.x += chord * math.cos(self.yaw + turn / 2)
+        self.y += chord * math.sin(self.yaw + turn / 2)
         self.yaw += turn
         self.way += abs(self.speed) * seconds
+
+
+def _within(value: float, most: float) -> float:
+    """A number, or the nearest one whose amount is at most `most`."""
+    return min(max(value, -most), most)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The runner of mazes as a process: it drives by plans of the floor, and stands, and says why, where there is none."""
+"""The runner as a process, without pictures: it steers by plans of the floor, and by nothing else."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import array
 import math
 import sys
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
@@ -15,28 +15,64 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TwistStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from node_bench import NodeBench
 from sensor_msgs.msg import CameraInfo, PointCloud2
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
-from robot_vision.mapping import Pose
+from robot_vision.mapping import PlanView, Pose
 from robot_vision.planning import Maze
-from robot_vision.ros.floor_messages import plan_to_message
-from robot_vision.ros.messages import vanishing_points_to_message
+from robot_vision.ros import floor_messages, messages
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "planning"))
+sys.path.insert(0, str(FilePath(__file__).resolve().parents[1] / "planning"))
 
-from seen_mazes import CAMERA, EYE, plan_from  # noqa: E402  (beside the tests of the library)
+from seen_mazes import CAMERA, plan_from  # noqa: E402
 
-AISLE = Maze.parse("+---+\n| G |\n+   +\n|   |\n+   +\n| S |\n+---+\n")
-START = Pose(0.5, 0.5, math.pi / 2)
-PLAN = plan_from(AISLE, START)
+HALL = Maze.parse("+---+---+---+\n| S       G |\n+---+---+---+\n")
 STEP_NS = 200_000_000
+SETTINGS = {
+    "rows": 1,
+    "columns": 3,
+    "goals": ["0,2"],
+    "heading": "east",
+    "camera.height": CAMERA.height_m,
+    "camera.pitch": CAMERA.pitch,
+    "camera.x": CAMERA.x_m,
+    "timeout": 20.0,
+}
+
+
+class Robot:
+    """What the runner hears of a robot that stands somewhere in the hall."""
+
+    def __init__(self, bench: NodeBench) -> None:
+        self.bench = bench
+        self.header = Header()
+        self.x = 0.5
+
+    def look(self, plan: PlanView | None = None, calibrated: bool = True) -> TwistStamped:
+        """Say where it is and what it sees, by default all of the hall, and wait for the steering to that."""
+        header = self.header = self.bench.header("base_link", STEP_NS)
+        if calibrated:
+            self.bench.say_surely("camera_info", camera_info(header))
+        self.bench.say_surely("odom", odometry(header, self.x - 0.5))
+        self.bench.say_surely("vanishing_points", messages.vanishing_points_to_message(header, None))
+        seen = plan or plan_from(HALL, Pose(self.x, 0.5, 0.0))
+        self.bench.say_surely("plan_view", floor_messages.plan_to_message(header, seen, "base_link"))
+        answer: TwistStamped = self.bench.answer("steering", header)
+        return answer
+
+    def drive(self) -> TwistStamped:
+        """Go on in steps, in each a picture of its own, until the runner says to drive."""
+        for _ in range(20):
+            self.x += 0.02
+            answer = self.look()
+            if answer.twist.linear.x > 0.0:
+                return answer
+        raise AssertionError(f"it does not drive: {self.bench.state('message')}")
 
 
 @pytest.fixture(scope="module")
 def bench(ros_domain: int) -> Iterator[NodeBench]:
-    place = {"camera.height": CAMERA.height_m, "camera.pitch": CAMERA.pitch, "camera.x": EYE}
-    maze = {"rows": 3, "columns": 1, "goals": ["2,0"]}
-    bench = NodeBench(ros_domain, "maze_runner", {**place, **maze, "timeout": 20.0})
+    bench = NodeBench(ros_domain, "maze_runner", SETTINGS)
     try:
         for kind, topic in (
             (CameraInfo, "camera_info"),
@@ -53,21 +89,27 @@ def bench(ros_domain: int) -> Iterator[NodeBench]:
         bench.close()
 
 
-def odometry(bench: NodeBench) -> Odometry:
-    message = Odometry(header=bench.header("odom", STEP_NS))
+@pytest.fixture
+def robot(bench: NodeBench) -> Iterator[Robot]:
+    """A robot in the start cell; the clock goes back afterwards, so that the next one starts anew."""
+    yield Robot(bench)
+    bench.header(step_ns=-STEP_NS * 100)
+
+
+def camera_info(header: Header) -> CameraInfo:
+    info = CameraInfo(header=header, width=CAMERA.width, height=CAMERA.height, distortion_model="plumb_bob")
+    info.d = [0.0] * 5
+    info.k = [CAMERA.fx, 0.0, CAMERA.cx, 0.0, CAMERA.fy, CAMERA.cy, 0.0, 0.0, 1.0]
+    info.r = np.eye(3).ravel().tolist()
+    info.p = [CAMERA.fx, 0.0, CAMERA.cx, 0.0, 0.0, CAMERA.fy, CAMERA.cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    return info
+
+
+def odometry(header: Header, x: float) -> Odometry:
+    message = Odometry(header=Header(stamp=header.stamp, frame_id="odom"))
+    message.pose.pose.position.x = x
     message.pose.pose.orientation.w = 1.0
     return message
-
-
-def look(bench: NodeBench) -> TwistStamped:
-    """Tell where the robot is and what it sees from its start, and wait for the steering to that."""
-    told = odometry(bench)
-    bench.say("odom", told)
-    bench.say_surely("vanishing_points", vanishing_points_to_message(told.header, None))
-    bench.say_surely("plan_view", plan_to_message(told.header, PLAN, "base_link"))
-    answer: TwistStamped = bench.answer("steering", told.header)
-    assert answer.header.frame_id == "base_link"
-    return answer
 
 
 def is_still(message: TwistStamped) -> bool:
@@ -78,45 +120,64 @@ def says(bench: NodeBench, words: str) -> None:
     bench.until(lambda: words in bench.state("message"), f"it says {words!r}, not {bench.state('message')!r}")
 
 
-def drives(bench: NodeBench) -> None:
-    bench.until(lambda: look(bench).twist.linear.x > 0.05, "it drives on")
+def test_without_a_calibration_it_stands_and_says_so_in_a_line(robot: Robot) -> None:
+    assert is_still(robot.look(calibrated=False))
+    robot.bench.log_line("camera_info", "no direction without a calibration")
 
 
-def calibrate(bench: NodeBench) -> None:
-    bench.say_surely("camera_info", CameraInfo(**CAMERA.camera_info()))
-
-
-def test_without_a_calibration_it_stands_and_says_so_in_a_line(bench: NodeBench) -> None:
-    assert is_still(look(bench))
-    bench.log_line("/camera_info", "no direction without a calibration")
-
-
-def test_it_drives_towards_the_goal_from_where_it_believes_to_be(bench: NodeBench) -> None:
-    calibrate(bench)
-    drives(bench)
-    pose = bench.said("pose")[-1]
+def test_it_tells_where_it_is_and_drives(robot: Robot) -> None:
+    robot.look()  # the clock goes back with it: it may be forgotten with all before
+    robot.look()
+    robot.drive()
+    pose = robot.bench.answer("pose", robot.header)
     assert pose.header.frame_id == "maze"
-    assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == pytest.approx((0.5, 0.5), abs=0.1)
-    says(bench, "in the cell (0, 0)")
+    assert pose.pose.pose.position.x == pytest.approx(robot.x, abs=0.03)
 
 
-def test_plans_that_are_too_old_are_not_steered_by(bench: NodeBench) -> None:
-    calibrate(bench)
-    drives(bench)
-    assert bench.set_parameter("max_age", 2.0).successful  # the stamps here are of 1970
-    assert is_still(look(bench))
-    says(bench, "stands still: the plan of the floor is ")
-    assert bench.set_parameter("max_age", 0.0).successful
-    drives(bench)
+def test_a_frozen_camera_makes_it_stand_whatever_stamps_its_pictures_have(robot: Robot) -> None:
+    robot.drive()
+    frozen = plan_from(HALL, Pose(robot.x, 0.5, 0.0))
+    robot.x += 0.05
+    for _ in range(3):
+        assert is_still(robot.look(frozen))
+    says(robot.bench, "stands still: the plan of the floor stays the same while the robot moves")
+    robot.drive()
 
 
-def test_disabled_it_stands_and_enabled_it_goes_on(bench: NodeBench) -> None:
-    calibrate(bench)
-    drives(bench)
+def test_plans_that_show_nothing_make_it_stand(robot: Robot) -> None:
+    robot.drive()
+    dark = plan_from(HALL, Pose(robot.x, 0.5, 0.0))
+    dark = PlanView(np.full_like(dark.cells, -1), dark.resolution, dark.origin)
+    assert is_still(robot.look(dark))
+    says(robot.bench, "stands still: the plan of the floor shows nothing")
+    robot.drive()
+
+
+def test_stamps_that_stand_still_are_not_steered_by(robot: Robot) -> None:
+    robot.drive()
+    count = len(robot.bench.said("steering"))
+    again = plan_from(HALL, Pose(robot.x + 0.05, 0.5, 0.0))
+    robot.bench.say_surely("plan_view", floor_messages.plan_to_message(robot.header, again, "base_link"))
+    robot.bench.log_line("plan_view", "its stamp does not advance")
+    assert len(robot.bench.said("steering")) == count
+
+
+def test_disabled_it_stands_and_enabled_it_goes_on(robot: Robot) -> None:
+    robot.drive()
+    bench = robot.bench
     assert bench.call(SetBool, "enable", SetBool.Request(data=False)).success
     bench.until(lambda: is_still(bench.said("steering")[-1]), "it stands still")
     assert bench.call(SetBool, "maze_runner/enable", SetBool.Request(data=True)).success
-    drives(bench)
+    robot.drive()
+
+
+def test_old_pictures_are_not_steered_by(robot: Robot) -> None:
+    bench = robot.bench
+    assert bench.set_parameter("max_age", 0.5).successful  # stamps of this bench are as old as the clock
+    assert is_still(robot.look())
+    says(bench, "stands still: the plan of the floor is ")
+    assert bench.set_parameter("max_age", 0.0).successful
+    robot.drive()
 
 
 @pytest.mark.parametrize(
@@ -128,9 +189,9 @@ def test_disabled_it_stands_and_enabled_it_goes_on(bench: NodeBench) -> None:
         ("value", "is 101, neither -1 nor 0 to 100"),
     ],
 )
-def test_a_bad_plan_gets_a_line_and_no_steering(bench: NodeBench, fault: str, words: str) -> None:
-    calibrate(bench)
-    message = plan_to_message(bench.header("odom", STEP_NS), PLAN, "base_link")
+def test_a_bad_plan_gets_a_line_and_no_steering(robot: Robot, fault: str, words: str) -> None:
+    plan = plan_from(HALL, Pose(robot.x, 0.5, 0.0))
+    message = floor_messages.plan_to_message(robot.bench.header("base_link", STEP_NS), plan, "base_link")
     if fault == "frame":
         message.header.frame_id = "odom"
     elif fault == "turned":
@@ -139,36 +200,31 @@ def test_a_bad_plan_gets_a_line_and_no_steering(bench: NodeBench, fault: str, wo
     elif fault == "cells":
         message.info.height += 1
     else:
-        message.data = array.array("b", np.full(PLAN.cells.size, 101, np.int8).tobytes())
-    bench.say_surely("plan_view", message)
-    bench.log_line("/plan_view", words)
-    drives(bench)
-    assert not any(said.header.stamp == message.header.stamp for said in bench.said("steering"))
+        message.data = array.array("b", np.full(plan.cells.size, 101, np.int8).tobytes())
+    robot.bench.say_surely("plan_view", message)
+    robot.bench.log_line("plan_view", words)
+    robot.drive()
+    assert not any(said.header.stamp == message.header.stamp for said in robot.bench.said("steering"))
 
 
-def test_odometry_that_is_no_number_gets_a_line(bench: NodeBench) -> None:
-    calibrate(bench)
-    message = odometry(bench)
-    message.pose.pose.position.x = math.nan
-    bench.say("odom", message)
-    bench.say_surely("plan_view", plan_to_message(message.header, PLAN, "base_link"))
-    bench.log_line("/odom", "is nan")
-    drives(bench)
+def test_odometry_that_is_no_number_gets_a_line(robot: Robot) -> None:
+    robot.bench.say_surely("odom", odometry(robot.bench.header("base_link", STEP_NS), math.nan))
+    robot.bench.log_line("odom", "is nan")
+    robot.drive()
 
 
-def test_a_clock_that_jumps_back_makes_it_start_anew(bench: NodeBench) -> None:
-    calibrate(bench)
-    drives(bench)
-    bench.next_stamp(-10_000_000_000)
-    look(bench)
-    bench.log_line("/plan_view", "went back")
-    drives(bench)
+def test_a_clock_that_jumps_back_makes_it_start_anew(robot: Robot) -> None:
+    robot.drive()
+    robot.bench.header(step_ns=-10 * STEP_NS)
+    robot.look()
+    robot.bench.log_line("plan_view", "went back")
+    robot.drive()
 
 
-def test_silence_makes_it_stand(bench: NodeBench) -> None:
-    calibrate(bench)
-    drives(bench)
+def test_silence_makes_it_stand(robot: Robot) -> None:
+    bench = robot.bench
     assert bench.set_parameter("timeout", 0.5).successful
-    drives(bench)
+    last = robot.drive()
     bench.until(lambda: is_still(bench.said("steering")[-1]), "it stands still")
-    says(bench, "stands still: no plan of the floor for 0.5 s")
+    assert bench.said("steering")[-1].header.stamp == last.header.stamp
+    says(bench, "no plan of the floor for 0.5 s")

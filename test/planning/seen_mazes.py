@@ -19,12 +19,24 @@ CAMERA = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=1 / 3, pitch=0.26
 
 
 def plan_from(
-    maze: Maze, pose: Pose, noise: float = 0.0, random: np.random.Generator | None = None
+    maze: Maze,
+    pose: Pose,
+    noise: float = 0.0,
+    random: np.random.Generator | None = None,
+    shadow: tuple[float, float] = (0.0, 0.0),
 ) -> PlanView:
-    """The plan of the floor seen from a pose in a maze of cells of 1 m; `noise` (m) is of where floor ends."""
+    """The plan of the floor seen from a pose in a maze of cells of 1 m.
+
+    Args:
+        maze: all of it.
+        pose: of base_link.
+        noise: of where floor ends, m.
+        random: makes the noise.
+        shadow: from walls to the edge of their shadows, where floor seems to end, m.
+    """
     bearings = np.linspace(-HALF_VIEW, HALF_VIEW, 241)
     eye = np.array([pose.x + EYE * np.cos(pose.yaw), pose.y + EYE * np.sin(pose.yaw)])
-    ends = _distances(maze, eye, pose.yaw + bearings)
+    ends = _distances(maze, eye, pose.yaw + bearings, shadow)
     if random is not None:
         ends += noise * random.standard_normal(len(ends))
     ends = np.maximum(ends, NEAR)
@@ -49,13 +61,16 @@ def directions_from(yaw: float) -> NDArray[np.float64]:
     return np.asarray(np.where(found[:, 2:] < 0.0, -found, found))
 
 
-def _distances(maze: Maze, eye: NDArray[np.float64], angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From a place to the nearest face of a wall along rays (N,), m."""
+def _distances(
+    maze: Maze, eye: NDArray[np.float64], angles: NDArray[np.float64], shadow: tuple[float, float]
+) -> NDArray[np.float64]:
+    """From a place to the nearest face of a wall, or its shadow's edge, along rays (N,), m."""
     rays = np.column_stack([np.cos(angles), np.sin(angles)])
     nearest = np.full(len(angles), np.inf)
     for axis, walls in ((0, maze.upright), (1, maze.across.T)):
         for line in range(walls.shape[1]):
-            face = line - np.sign(rays[:, axis]) * WALL / 2
+            ahead = np.sign(rays[:, axis])
+            face = line - ahead * (WALL / 2 + np.maximum(-ahead * shadow[axis], 0.0))
             with np.errstate(divide="ignore", invalid="ignore"):
                 way = (face - eye[axis]) / rays[:, axis]
                 along = eye[1 - axis] + way * rays[:, 1 - axis]

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from seen_mazes import CAMERA, EYE, directions_from, plan_from
 
-from robot_vision.mapping import Pose
+from robot_vision.mapping import PlanView, Pose
 from robot_vision.planning import Maze, MazeRunner, PlanningError
 from robot_vision.planning.maze_cells import cells_from_texts, middle_goals
+from robot_vision.planning.navigator import Route
 from robot_vision.simulation.live import LiveDrive
 from robot_vision.simulation.maze import grown
 
@@ -84,6 +85,34 @@ def test_the_robot_turns_off_in_the_middle_of_a_cell_and_not_before() -> None:
         points = runner.route().points
         assert points[-1] == pytest.approx((0.5, 1.5) if y < 1.45 else (1.5, 1.5))
     assert points[0] == pytest.approx((0.5, 1.5))
+
+
+def test_it_stands_while_it_cannot_see_and_goes_on_when_it_can() -> None:
+    hall = Maze.parse("+---+---+---+\n| S       G |\n+---+---+---+\n")
+    runner = MazeRunner(hall.size, hall.goals, heading=1)
+
+    def after(stamp: float, x: float, plan: PlanView, odometry: bool = True) -> Route:
+        if odometry:
+            runner.move(stamp, Pose(x - 0.5, 0.0, 0.0))
+        runner.see_plan(stamp, plan, EYE)
+        return runner.route()
+
+    seen = [plan_from(hall, Pose(x, 0.5, 0.0)) for x in (0.5, 0.6, 0.7)]
+    for number in range(9):
+        route = after(0.1 * number, 0.5, seen[0])
+    assert len(route.points)
+    frozen = after(1.0, 0.56, seen[0])
+    assert not len(frozen.points)
+    assert "stays the same while the robot moves" in frozen.reason
+    assert not len(after(1.1, 0.56, seen[0]).points)
+    assert len(after(1.2, 0.6, seen[1]).points)
+    dark = after(1.3, 0.65, PlanView(np.full_like(seen[0].cells, -1), seen[0].resolution, seen[0].origin))
+    assert not len(dark.points)
+    assert "shows nothing" in dark.reason
+    assert len(after(1.4, 0.7, seen[2]).points)
+    lost = after(3.0, 0.7, plan_from(hall, Pose(0.8, 0.5, 0.0)), odometry=False)
+    assert not len(lost.points)
+    assert "no odometry" in lost.reason
 
 
 def test_settings_that_make_no_sense_are_refused() -> None:
