@@ -13,6 +13,8 @@ import numpy as np
 from numba import njit
 
 _TURN = 2.0 * math.pi
+#: Rows whose image rows, were they all in step, had not this share of the best votes are not looked at.
+_HOPELESS = 0.5
 
 
 @njit(cache=True, fastmath=True)
@@ -154,7 +156,8 @@ def _add(re, im, turn, sum_real, sum_imaginary):
 def search(spectrum, hypotheses, least, pooling, most, step, columns, bends, column_cost, bend_cost):
     """Votes an image row (N,), less the costs, of the best rows for each (spacing at the bottom, ratio top / bottom).
 
-    They are straight or bent, and told by the fundamental alone. `hypotheses` is (N, 2); `columns`, an odd number,
+    They are straight or bent, and told by the fundamental alone; -1e9 where there could not be half as many votes as
+    the best ones have. `hypotheses` is (N, 2); `columns`, an odd number,
     and `bends` as for `turn_pools`, about none.
     """
     height = spectrum.shape[0]
@@ -162,23 +165,18 @@ def search(spectrum, hypotheses, least, pooling, most, step, columns, bends, col
     sum_real = np.empty((len(bends), columns), np.float32)
     sum_imaginary = np.empty((len(bends), columns), np.float32)
     turn = np.empty((2, columns), np.float32)
-    found = np.empty(len(hypotheses))
-    for n in range(len(hypotheses)):
-        pools = pool(
-            spectrum,
-            hypotheses[n, 0],
-            hypotheses[n, 1],
-            least,
-            pooling,
-            most,
-            1,
-            rates,
-            real,
-            imaginary,
-            density,
-        )
-        found[n] = -1e9
+    found = np.full(len(hypotheses), -1e9)
+    best = 0.0
+    # Backwards: wide rows, which win more often, come last
+    for n in range(len(hypotheses) - 1, -1, -1):
+        bottom, ratio = hypotheses[n]
+        pools = pool(spectrum, bottom, ratio, least, pooling, most, 1, rates, real, imaginary, density)
         if pools < 2:
+            continue
+        bound = 0.0
+        for g in range(pools):
+            bound += math.sqrt(real[g] ** 2 + imaginary[g] ** 2)
+        if bound / height < _HOPELESS * best:
             continue
         turn_pools(real, imaginary, density, pools, 1, 0.0, step, 0.0, bends, sum_real, sum_imaginary, turn)
         for a in range(len(bends)):
@@ -186,6 +184,7 @@ def search(spectrum, hypotheses, least, pooling, most, step, columns, bends, col
                 votes = math.sqrt(sum_real[a, b] ** 2 + sum_imaginary[a, b] ** 2) / height
                 votes -= bend_cost * abs(bends[a]) + column_cost * abs((b - columns // 2) * step)
                 found[n] = max(found[n], votes)
+        best = max(best, found[n])
     return found
 
 

@@ -53,7 +53,6 @@ class RowTracer:
         drift: most phase steps (1/64 spacing) a band.
         turn_cost: of a change of the drift by a step a band, where rows are wide.
         ease: the turn costs less where rows are narrow, by this power of their spacing in the picture.
-        drift_cost: of the drift, relative to that.
         stretch_cost: of a change of the spacing by a step.
         stretched_cost: of a spacing that differs by its own size, an image row of a picture 240 high.
         known_cost: the same where spacing and horizon are known and not estimated.
@@ -65,15 +64,14 @@ class RowTracer:
     band: float = 3.0
     reach: float = 3.5
     usual: float = 0.2
-    power: float = 0.4
-    blur: float = 0.055
+    power: float = 0.2
+    blur: float = 0.06
     stretch: float = 0.21
     stretches: int = 9
     drift: int = 6
     turn_cost: float = 4.5
     ease: float = 1.5
-    drift_cost: float = 0.01
-    stretch_cost: float = 1.28
+    stretch_cost: float = 0.9
     stretched_cost: float = 0.4
     known_cost: float = 1.8
     smooth: float = 2.2
@@ -170,13 +168,13 @@ class RowTracer:
         from robot_vision.perception.crop_rows.tracing_kernels import accumulate, best_through, recall
 
         cost = np.float32(self.stretch_cost)
-        accumulate(scores, turn, self.drift_cost * turn, cost, self._totals)
+        accumulate(scores, turn, cost, self._totals)
         path = np.empty((len(scores), 2), np.int64)
         recall(self._totals, turn, cost, path)
         # Upwards a path drifts the other way
         backwards = np.ascontiguousarray(turn[::-1])
         upwards = np.ascontiguousarray(scores[::-1])
-        accumulate(upwards, backwards, self.drift_cost * backwards, cost, self._back)
+        accumulate(upwards, backwards, cost, self._back)
         by_phase, by_stretch = (
             np.empty((len(scores), _PHASES), np.float32),
             np.empty(scores.shape[:2], np.float32),

@@ -9,7 +9,7 @@ from numba import njit
 
 
 @njit(cache=True, fastmath=True)
-def accumulate(scores, turn_cost, drift_cost, stretch_cost, totals):
+def accumulate(scores, turn_cost, stretch_cost, totals):
     """Best total score of a path from the first band to each state (stretch, drift, phase) of each band.
 
     A path's phase moves by its drift from band to band; drift and stretch change by at most one step a band.
@@ -17,7 +17,6 @@ def accumulate(scores, turn_cost, drift_cost, stretch_cost, totals):
     Args:
         scores: float32 (B, E, P).
         turn_cost: (B,) of a change of the drift.
-        drift_cost: (B,) times drift^2.
         stretch_cost: of a change of the stretch.
         totals: float32 (B, E, D, P) to be filled; D odd, its middle is no drift.
     """
@@ -39,16 +38,14 @@ def accumulate(scores, turn_cost, drift_cost, stretch_cost, totals):
         for e in range(stretches):
             lower, upper = turned[max(e - 1, 0)], turned[min(e + 1, stretches - 1)]
             for q in range(drifts):
-                drift = q - drifts // 2
-                cost = np.float32(drift_cost[b] * drift * drift)
-                shift = drift % phases
+                shift = (q - drifts // 2) % phases
                 # phase j comes from phase j - drift: two runs without a wrap, which the compiler makes vectors of
                 for begin, end, source in ((shift, phases, 0), (0, shift, phases - shift)):
                     stop = source + end - begin
                     same, less, more = turned[e, q, source:stop], lower[q, source:stop], upper[q, source:stop]
                     gain, best = scores[b, e, begin:end], totals[b, e, q, begin:end]
                     for j in range(end - begin):
-                        best[j] = max(same[j], max(less[j], more[j]) - stretch_cost) + gain[j] - cost
+                        best[j] = max(same[j], max(less[j], more[j]) - stretch_cost) + gain[j]
 
 
 @njit(cache=True, fastmath=True)
