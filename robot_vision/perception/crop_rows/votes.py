@@ -10,6 +10,7 @@ coefficients are its votes. Their sum is a complex number: its angle is the offs
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ USUAL_WIDTH = 320.0
 _POOLED = 24
 #: Peaks of the coarse search that are looked at again.
 _PEAKS = 6
-_AROUND = np.array([(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)])
+_WIDER, _NEARER = np.array([(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]).T
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ class RowVotes:
         best = -np.inf
         for _ in range(3):
             step = 0.5 * step
-            around = place * np.exp(step * _AROUND * [1.0, 0.0]) + step * _AROUND * [0.0, 1.0]
+            around = np.column_stack([place[0] * np.exp(step[0] * _WIDER), place[1] + step[1] * _NEARER])
             votes = self._search(spectrum, width, around, 31, _bends(11, 4.5), 0.003)
             place, best = around[votes.argmax()], float(votes.max())
         return place, best
@@ -163,6 +164,7 @@ class RowVotes:
         )
 
 
+@cache
 def _bends(count: int, most: float) -> Array:
     """Bends to try, denser about none."""
     even = np.linspace(-1.0, 1.0, count)
