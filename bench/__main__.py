@@ -25,6 +25,7 @@ BENCHMARKS = {
     "closed_loop": "30 m of corridor driven by the graph itself, ten times",
     "centres": "true centres of holes on rendered plates",
     "crbd": "crop rows of single real pictures, beside the textbook's recipe",
+    "row_folds": "the same with settings chosen on other pictures",
     "field": "crop rows of recorded drives through three simulated crops",
     "spray": "plants followed, weeds sprayed and crop spared in three simulated crops",
     "field_loop": "crop rows driven along at 1.6 m/s, to the headland and through a gap",

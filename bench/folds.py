@@ -105,9 +105,16 @@ def chosen_by(of_all: Array) -> Array:
     return np.asarray(of_all[:, :, : _AA10 + 1].mean(axis=2))
 
 
-def held_out(of_all: Array, random: np.random.Generator) -> Array:
-    """Return the scores (6,) of pictures under settings chosen without them, of the scores (S, P, 6)."""
-    goal, count = chosen_by(of_all), of_all.shape[1]
+def held_out(of_all: Array, random: np.random.Generator, goal: Array | None = None) -> Array:
+    """Return the scores (K,) of pictures under settings chosen without them.
+
+    Args:
+        of_all: (S, P, K) scores of each setting and picture.
+        random: that divides the pictures.
+        goal: (S, P) by which settings are chosen; those of York Urban if there is none.
+    """
+    goal = chosen_by(of_all) if goal is None else goal
+    count = of_all.shape[1]
     judged = []
     for _ in range(ROUNDS):
         fold = random.permutation(count) % FOLDS

@@ -265,6 +265,8 @@ class CropRowSteeringNode(SteeringNode):
             self.diagnostics.report(Level.WARN, steering.reason)
         elif not estimate.seen:
             self.diagnostics.report(Level.WARN, f"goes on by odometry: {estimate.reason}", UNSEEN_ADVICE)
+        elif estimate.reason:
+            self.diagnostics.report(Level.WARN, f"doubts its row: {estimate.reason}", UNSEEN_ADVICE)
         else:
             self.diagnostics.report(Level.OK, "follows its row")
 

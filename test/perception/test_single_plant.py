@@ -14,7 +14,11 @@ from hypothesis import strategies as st
 from robot_vision.geometry import GroundPlane
 from robot_vision.perception.crop_rows.ground_fit import Curvature, GroundFit, pieces_of
 from robot_vision.perception.crop_rows.recipe import plants as centres_of
-from robot_vision.perception.crop_rows.single_plant import heading_of_plants, heading_roots
+from robot_vision.perception.crop_rows.single_plant import (
+    contradicting_heading,
+    heading_of_plants,
+    heading_roots,
+)
 from robot_vision.perception.vegetation import VegetationMask
 
 
@@ -74,3 +78,16 @@ def test_it_checks_the_fit_from_the_same_picture(offset: float, yaw: float) -> N
     assert vote.psi == pytest.approx(rows.values[1], abs=math.radians(0.7))
     assert vote.psi == pytest.approx(yaw, abs=math.radians(0.7))
     assert vote.agreement > 0.6
+
+
+@pytest.mark.parametrize("wrong", [0.13, -0.15])
+def test_a_heading_that_is_wrong_is_contradicted_and_the_right_one_is_not(wrong: float) -> None:
+    places = plants(Sown(offset=0.1, yaw=0.03, weeds=0.5), np.random.default_rng(1))
+    seen = (places[:, 0] > 0.8) & (places[:, 0] < 5.0) & (np.abs(places[:, 1]) < 1.5)
+    ahead, left = places[seen].T
+    told = ahead, left, np.ones(len(ahead)), 0.1, 0.5
+    assert contradicting_heading(*told, 0.03) is None
+    other = contradicting_heading(*told, 0.03 + wrong)
+    assert other == pytest.approx(0.03, abs=math.radians(0.5))
+    few = ahead[:10], left[:10], np.ones(10), 0.1, 0.5
+    assert contradicting_heading(*few, 0.03 + wrong) is None

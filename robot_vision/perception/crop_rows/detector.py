@@ -121,7 +121,8 @@ class CropRowDetector:
             weight = self.weight.of(small).weight
             rows = self.votes.search(self.votes.spectrum(weight), width, spacing, ratio)
             if self.method == "traced":
-                traced = self.tracer.trace(weight, rows, least)
+                known = spacing is not None and ratio is not None
+                traced = self.tracer.trace(weight, rows, least, known)
             else:
                 traced = straight(rows, small.shape[0], width, least)
         return _enlarged(rows, traced, bgr.shape[:2], small.shape[:2])

@@ -28,6 +28,7 @@ from robot_vision.perception.crop_rows.ground_fit import (
 from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, row_cover
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 from robot_vision.perception.crop_rows.sight import fault_of
+from robot_vision.perception.crop_rows.single_plant import contradicting_heading
 from robot_vision.perception.crop_rows.start import start_on_ground
 from robot_vision.perception.lane import LaneHeading
 from robot_vision.perception.vegetation import Picture, VegetationMask
@@ -47,6 +48,8 @@ _MOST_REFUSED = 8
 _LOST = 0.2
 #: Rows to either side of the robot's own that tell where rows end.
 _SIDE_ROWS = 2.5
+#: Ground ahead whose plants are asked for the heading one by one, m, and factor on the variances where they dissent.
+_ASKED_M, _DISSENT = 5.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -162,13 +165,30 @@ class RowTracker:
             return self._without(fault)
         expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
         rows = nearest_row(rows, expected)
+        dissent = self._dissent(pieces, rows, camera)
+        if dissent:
+            rows = replace(rows, covariance=_DISSENT * rows.covariance)
         if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3]):
             self._look_along(pieces, camera, self._start(), motion)
             return self._without("what stands in this picture does not go on from the rows before")
         self._refused = 0
         self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, motion)
-        return RowEstimate(self._lane(), "", True, rows, self.extent.end(self._way))
+        return RowEstimate(self._lane(), dissent, True, rows, self.extent.end(self._way))
+
+    def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
+        """What single plants (20.11)-(20.15) have against the rows fitted to all of them; empty when nothing."""
+        x, y = ground_places(pieces.rays, camera, rows.values)
+        asked = (
+            (x > camera.x_m) & (x < camera.x_m + _ASKED_M) & (np.abs(y) < (_SIDE_ROWS + 0.5) * self.spacing)
+        )
+        offset, yaw, curvature = rows.values[:3].tolist()
+        # Rows that bend away are straightened: the quadratic is that of straight ones
+        left = y[asked] - 0.5 * curvature * x[asked] ** 2
+        other = contradicting_heading(x[asked], left, pieces.weight[asked], offset, self.spacing, yaw)
+        if other is None:
+            return ""
+        return f"single plants say the robot heads {np.rad2deg(other - yaw):+.0f} degrees off what their rows say"
 
     def _start(self) -> Array:
         """What a picture should show, (6,): as predicted, the body upright."""

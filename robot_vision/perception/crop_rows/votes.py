@@ -10,6 +10,7 @@ coefficients are its votes. Their sum is a complex number: its angle is the offs
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ USUAL_WIDTH = 320.0
 _POOLED = 24
 #: Peaks of the coarse search that are looked at again.
 _PEAKS = 6
-_AROUND = np.array([(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)])
+_WIDER, _NEARER = np.array([(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]).T
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class RowVotes:
         nearest, farthest: ratio of the spacings at first and last image row.
         least: spacing below which an image row says nothing, px of a picture 320 wide.
         power: of the standard deviation by which an image row is divided.
+        fading: how much less than in the middle a pixel at the left or right border counts.
         columns: farthest vanishing point to either side, px of a picture 320 wide.
         lean_cost: votes that 100 px of vanishing column cost.
         bend_cost: votes that a bend of 1 costs.
@@ -72,6 +74,7 @@ class RowVotes:
     farthest: float = 0.42
     least: float = 8.0
     power: float = 0.884
+    fading: float = 0.9
     columns: float = 60.0
     lean_cost: float = 0.05
     bend_cost: float = 0.0018
@@ -83,7 +86,8 @@ class RowVotes:
 
         height, width = weight.shape
         centred = np.zeros((height, cv2.getOptimalDFTSize(int(3.2 * width))), np.float32)
-        standardise_rows(weight, centred, self.power)
+        side = np.linspace(-1.0, 1.0, width)
+        standardise_rows(weight, (1.0 - self.fading * side**2).astype(np.float32), centred, self.power)
         return np.asarray(cv2.dft(centred, flags=cv2.DFT_ROWS), np.float32)
 
     def search(
@@ -131,10 +135,10 @@ class RowVotes:
         fixed = spectrum, spacing, ratio, self.least * z, 0.003 / z, _POOLED, gains
         reach = 2.0 * self.columns * z
         step = reach / 30.0
-        _, column, bend, _ = settle(*fixed, -reach, step, 61, bends, *costs)
+        _, column, bend, _ = settle(*fixed, 0.0, step, 61, 0.0, bends, *costs)
         fine = max(0.1, 0.5 * float(np.min(np.abs(bends - bend)[np.abs(bends - bend) > 1e-9])))
-        near = bend + fine * np.linspace(-1.0, 1.0, 5)
-        votes, column, bend, offset = settle(*fixed, column - 1.5 * step, 0.5 * step, 7, near, *costs)
+        near = fine * np.linspace(-1.0, 1.0, 5)
+        votes, column, bend, offset = settle(*fixed, column, 0.5 * step, 7, bend, near, *costs)
         return StraightRows(spacing, ratio, float(column), float(bend), float(offset), float(votes))
 
     def _refined(self, spectrum: Weights, width: int, place: Array, step: Array) -> tuple[Array, float]:
@@ -142,7 +146,7 @@ class RowVotes:
         best = -np.inf
         for _ in range(3):
             step = 0.5 * step
-            around = place * np.exp(step * _AROUND * [1.0, 0.0]) + step * _AROUND * [0.0, 1.0]
+            around = np.column_stack([place[0] * np.exp(step[0] * _WIDER), place[1] + step[1] * _NEARER])
             votes = self._search(spectrum, width, around, 31, _bends(11, 4.5), 0.003)
             place, best = around[votes.argmax()], float(votes.max())
         return place, best
@@ -153,16 +157,14 @@ class RowVotes:
         from robot_vision.perception.crop_rows.kernels import search
 
         z = width / USUAL_WIDTH
-        found = np.empty((len(grid), 3))
-        reach = self.columns * z
-        step = 2.0 * reach / (columns - 1)
+        step = 2.0 * self.columns * z / (columns - 1)
         costs = self.lean_cost / 100.0 / z, self.bend_cost
-        search(
-            spectrum, grid, self.least * z, pooling / z, _POOLED, -reach, step, columns, bends, *costs, found
+        return np.asarray(
+            search(spectrum, grid, self.least * z, pooling / z, _POOLED, step, columns, bends, *costs)
         )
-        return np.asarray(found[:, 0])
 
 
+@cache
 def _bends(count: int, most: float) -> Array:
     """Bends to try, denser about none."""
     even = np.linspace(-1.0, 1.0, count)
