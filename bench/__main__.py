@@ -116,9 +116,9 @@ def seeds_of(text: str) -> tuple[int, ...]:
         first, dash, last = part.partition("-")
         if not (first.isdecimal() and (last if dash else first).isdecimal()):
             raise argparse.ArgumentTypeError(f"seeds look like 6-10 or 3,5, not {text!r}")
+        if dash and int(last) < int(first):
+            raise argparse.ArgumentTypeError(f"there is no seed in {part!r}")
         seeds += range(int(first), int(last or first) + 1)
-    if not seeds:
-        raise argparse.ArgumentTypeError(f"there is no seed in {text!r}")
     return tuple(dict.fromkeys(seeds))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.report import Cell, Row, at_most
+from bench.report import Cell, Row, at_least, at_most
 from robot_vision.geometry import Camera
 from robot_vision.mapping import PlanViewMapper, Pose
 from robot_vision.perception import LineSegments
@@ -43,13 +43,14 @@ def long_drive(looks: Sequence[Look], camera: Camera, pictures: int) -> list[Row
     """
     mapper, spent = PlanViewMapper(), np.empty(pictures)
     stretch = looks[-1].pose.x - looks[0].pose.x
-    begun = 0.0
+    begun, mapped = 0.0, 0
     for number in range(pictures):
         lap, place = divmod(number, len(looks))
         look = looks[place]
         pose = look.pose._replace(x=look.pose.x + lap * stretch)
         began = time.process_time()
-        mapper.update(look.picture, look.lines, look.points, camera, PERIOD_S * number, pose)
+        estimate = mapper.update(look.picture, look.lines, look.points, camera, PERIOD_S * number, pose)
+        mapped += estimate.mapped
         spent[number] = time.process_time() - began
         if number == int(SETTLED * pictures):
             begun = _resident_mb()
@@ -58,6 +59,7 @@ def long_drive(looks: Sequence[Look], camera: Camera, pictures: int) -> list[Row
     way = stretch * pictures / len(looks)
     return [
         Row(f"{pictures} pictures, {way:.0f} m: a picture in the first tenth", "ms", [Cell(first)], 2),
+        Row("pictures that went into the map", "%", [Cell(100.0 * mapped / pictures, at_least(90.0))]),
         Row("a picture in the last tenth", "ms", [Cell(last, at_most(1.1 * first))], 2),
         Row("memory grown by after the first tenth", "MB", [Cell(_resident_mb() - begun, at_most(5.0))]),
         Row("memory of the map at the end", "MB", [Cell(mapper.map.nbytes / 1e6, at_most(16.0))]),

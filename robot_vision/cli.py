@@ -105,12 +105,12 @@ def demo(
     if live == "maze":
         from robot_vision.demo.maze_drive import run_maze
 
-        run_maze(out, seconds or 300.0, seed, console)
+        run_maze(out, 300.0 if seconds is None else seconds, seed, console)
         return
     if live is not None:
         from robot_vision.demo.live_drive import run_live
 
-        run_live(live, out, seconds or 20.0, seed, console)
+        run_live(live, out, 20.0 if seconds is None else seconds, seed, console)
         return
     drive = shared_file("bags/corridor.mcap") if bag is None else bag
     run_demo(drive, out, Mount(height, math.radians(pitch)), console)

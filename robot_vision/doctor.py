@@ -192,7 +192,9 @@ def warm_steps() -> list[tuple[str, Callable[[], None]]]:
         ("lines", _find_lines),
         ("vanishing points", _find_vanishing_points),
         ("planning", _plan),
+        ("mazes", _explore),
         ("crop rows", _find_crop_rows),
+        ("plants", _find_plants),
     ]
 
 
@@ -206,6 +208,18 @@ def _find_crop_rows() -> None:
     from robot_vision.perception import CropRowDetector
 
     CropRowDetector().warm_up()
+
+
+def _find_plants() -> None:
+    from robot_vision.perception.crop_rows.plant_blobs import PlantSegmenter
+
+    PlantSegmenter().warm_up()
+
+
+def _explore() -> None:
+    from robot_vision.planning import Maze, MazeExplorer
+
+    MazeExplorer(Maze.parse("+---+---+\n| S   G |\n+---+---+\n")).explore()
 
 
 def _find_vanishing_points() -> None:

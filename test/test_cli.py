@@ -99,7 +99,6 @@ def test_make_bag_makes_a_bag_that_can_be_read(tmp_path: Path) -> None:
         (("simulate", "--set", "colour=3", "-o", "x.mcap"), "'colour'"),
         (("demo", "--bag", "no/such.mcap"), "no/such.mcap"),
         (("demo", "--live", "moon"), "there is no world 'moon'"),
-        (("demo", "--live", "maze"), "knows no junctions"),
         (("demo", "--height", "nan"), "the camera must be 0 m or more"),
         (("demo", "--pitch", "120"), "-90 to 90 degrees, not 120"),
         (("simulate", "-o", "no/such/folder/x.png"), "no/such/folder/x.png"),

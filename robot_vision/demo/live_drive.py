@@ -25,10 +25,6 @@ _WAIT_S = 0.1
 _TELL_EVERY_NS = 1_000_000_000
 
 
-class WorldError(ValueError):
-    """A world that the nodes of the demonstration cannot drive through."""
-
-
 def run_live(world: str, out: Path, seconds: float, seed: int, console: Console) -> None:
     """Let the real nodes drive through a world, and leave demo.png, demo.mp4 and demo.mcap in a folder.
 
@@ -40,17 +36,10 @@ def run_live(world: str, out: Path, seconds: float, seed: int, console: Console)
         console: where the drive is told.
 
     Raises:
-        WorldError: it is a maze.
         SimulationError: there is no such world, or none with a lane.
         ProcessError: a node ended before the drive did.
         DrawingError: a result cannot be written.
     """
-    if world == "maze":
-        raise WorldError(
-            "the demonstration follows lanes and knows no junctions; a maze is explored by "
-            "ros2 launch robot_vision maze_camera.launch.py and driven by its plan by maze.launch.py, "
-            "or, without ROS, by python -m bench maze_camera maze_nodes"
-        )
     camera = build_world(world, seed).camera
     out.mkdir(parents=True, exist_ok=True)
     bag = out / "demo.mcap"

@@ -6,6 +6,7 @@ What has left the picture, because the robot has come too near, is remembered wh
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,8 @@ from robot_vision.mapping.occupancy import OccupancyMap
 from robot_vision.mapping.pose import Pose
 from robot_vision.perception import Role, VanishingPoints
 
-_HIDDEN_M, _STEP_M = 3.0, 0.025
-"""How far ahead of the front the map is asked, and how closely: four points to a cell of 5 cm."""
+_HIDDEN_M = 3.0
+"""How far ahead of the front the map is asked."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,14 @@ class Clearance:
     Args:
         width: of the strip, m: the robot's and some more.
         front: how far the robot's front lies ahead of base_link, m; the clearance begins there.
-        fewest: columns of the picture, or points of the map, that must have something in the way: fewer are noise.
+        fewest: columns of the picture that must have something in the way: fewer are noise.
+        fewest_cells: of the map, in place of columns.
     """
 
     width: float = 0.6
     front: float = 0.3
     fewest: int = 3
+    fewest_cells: int = 2
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.width) and self.width > 0.0):
@@ -88,9 +91,10 @@ class Clearance:
             inf when nothing is there.
         """
         toward = self._azimuth(points, view)
-        half = self.width / 2
+        half, step = self.width / 2, known.resolution / 2
         along, across = np.meshgrid(
-            np.arange(self.front, self.front + _HIDDEN_M, _STEP_M), np.arange(-half, half, _STEP_M)
+            np.arange(self.front, self.front + _HIDDEN_M, step),
+            np.linspace(-half, half, math.ceil(self.width / step) + 1),
         )
         x = np.cos(toward) * along - np.sin(toward) * across
         y = np.sin(toward) * along + np.cos(toward) * across
@@ -100,9 +104,10 @@ class Clearance:
             shown = (u > -0.5) & (u < columns - 0.5) & (v < rows - 0.5)
         here = pose.matrix @ np.stack([x[~shown], y[~shown], np.ones(int((~shown).sum()))])
         taken = known.odds(here[0], here[1]) > known.known
-        if taken.sum() < self.fewest:
+        cells = np.floor(here[:2, taken] / known.resolution)
+        if len(np.unique(cells, axis=1).T) < self.fewest_cells:
             return float("inf")
-        return max(float(np.sort(along[~shown][taken])[self.fewest - 1]) - self.front, 0.0)
+        return max(float(along[~shown][taken].min()) - self.front, 0.0)
 
     @staticmethod
     def _azimuth(points: VanishingPoints | None, view: GroundView) -> float:

@@ -40,6 +40,13 @@ class Horizon:
         """Standard deviation of the pitch, rad."""
         return float(np.sqrt(self.covariance[1, 1]))
 
+    @property
+    def knock(self) -> str:
+        """In words that the camera was turned on the robot, in the picture in which that became certain; else empty."""
+        return (
+            f"the camera has been knocked by {np.degrees(self.knocked):.1f} degrees" if self.knocked else ""
+        )
+
     def reach(self, share: float) -> float:
         """How far away (m) distances are known to a share: dZ / Z = Z dpitch / H, from (20.1)."""
         height = self.camera.height_m or 0.0

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera, GroundPlane
+from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping.appearance import FloorAppearance
 from robot_vision.mapping.boundary import Boundary, BoundaryFinder
 from robot_vision.mapping.clearance import Clearance
@@ -36,6 +37,8 @@ _DARK = 12.0
 """Mean grey level below which a picture shows nothing."""
 _FLAT = 3.0
 """Standard deviation of the grey levels below which something covers the lens."""
+_MOVED_M, _TURNED = 0.03, 0.02
+"""Way (m) and turn (rad) after which no two pictures are the same."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,7 @@ class PlanViewMapper:
     clearance: Clearance = field(default_factory=Clearance)
     features: FeatureAnnotator = field(default_factory=FeatureAnnotator)
     map: OccupancyMap = field(default_factory=OccupancyMap)
+    _first_seen: tuple[Picture, Pose] | None = field(default=None, init=False, repr=False)
     _slips: deque[float] = field(default_factory=lambda: deque(maxlen=15), init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -135,6 +139,7 @@ class PlanViewMapper:
         stages = (self.horizon, self.sample, self.appearance, self.motion, self.shadows, self.kerbs, self.map)
         for stage in stages:
             stage.reset()
+        self._first_seen = None
         self._slips.clear()
 
     def warm_up(self) -> None:
@@ -144,7 +149,7 @@ class PlanViewMapper:
         trial = PlanViewMapper()
         for step in range(2):
             pose = Pose(0.5 * step, 0.0, 0.0)
-            trial.update(picture, LineSegments.empty(), None, camera, 0.1 * step, pose)
+            trial.update(np.roll(picture, step, axis=1), LineSegments.empty(), None, camera, 0.1 * step, pose)
 
     def update(
         self,
@@ -182,6 +187,10 @@ class PlanViewMapper:
         unreadable = _unreadable(gray)
         if unreadable:
             return self._nothing(horizon, unreadable)
+        if self._is_frozen(gray, pose):
+            return self._nothing(
+                horizon, "the picture stays the same while the robot moves: does the camera hang?"
+            )
         if not horizon.steady:
             return self._nothing(
                 horizon, "the vanishing points contradict the horizon: was the camera knocked?"
@@ -252,6 +261,16 @@ class PlanViewMapper:
             layers=Layers(view, gray, score, shadow, parallax, kinds, straight),
         )
 
+    def _is_frozen(self, gray: Picture, pose: Pose | None) -> bool:
+        """Whether this is the very picture that was first seen from another place."""
+        if pose is None:
+            return False
+        if self._first_seen is None or not np.array_equal(self._first_seen[0], gray):
+            self._first_seen = gray, pose
+        before = self._first_seen[1]
+        way = np.hypot(pose.x - before.x, pose.y - before.y)
+        return bool(way >= _MOVED_M or abs(wrap_angle(pose.yaw - before.yaw)) >= _TURNED)
+
     def _kerbs(
         self,
         lines: LineSegments,
@@ -297,8 +316,8 @@ class PlanViewMapper:
         return float(np.median(self._slips)) if len(self._slips) >= 3 else float("nan")
 
     def _doubt(self, horizon: Horizon, pose: Pose | None, slip: float) -> str:
-        if horizon.knocked:
-            return f"the camera has been knocked by {np.degrees(horizon.knocked):.1f} degrees"
+        if horizon.knock:
+            return horizon.knock
         if abs(slip) > self.slip:
             more = "more" if slip > 0.0 else "less"
             return (

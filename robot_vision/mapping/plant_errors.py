@@ -21,6 +21,8 @@ _STEM, _CUT_APART = 0.1, 0.3
 def common_lean(claimed: Array, new: float, high: float) -> Array:
     """What is wrong with the lean of the rows in picture after picture: a root (2, 2) of its covariance, rad.
 
+    The symmetric root, so that its columns go on meaning the same from picture to picture.
+
     Rows that stand higher on one side, or farther ahead, look as if the body leaned.
 
     Args:
@@ -29,7 +31,7 @@ def common_lean(claimed: Array, new: float, high: float) -> Array:
         high: height of the leaves above the ground, as a share of the camera's.
     """
     variance, axes = np.linalg.eigh(claimed + (_UNEVEN * high) ** 2 * np.eye(2))
-    return np.asarray(axes * np.sqrt(np.maximum(variance - new**2, 0.0)))
+    return np.asarray(axes * np.sqrt(np.maximum(variance - new**2, 0.0)) @ axes.T)
 
 
 def other_rows(way: float) -> float:

@@ -146,7 +146,7 @@ class PlantTracks:
         before, shared = self.covariances[rows], self.shared[rows]
         cross = before @ _turned(jacobian) + shared @ _turned(common)
         surely = jacobian @ shared + common
-        gain = cross @ np.linalg.inv(jacobian @ cross + surely @ _turned(common) + noise)
+        gain = cross @ np.linalg.inv(jacobian @ cross + common @ _turned(surely) + noise)
         self.states[rows] += (gain @ (seen - expected)[:, :, None])[:, :, 0]
         after = before - gain @ _turned(cross)
         self.covariances[rows] = 0.5 * (after + _turned(after))

@@ -88,6 +88,7 @@ class MazeRunnerNode(SteeringNode):
     def on_clock_jump_back(self) -> None:
         """Start anew, in the start cell."""
         self._runner = self._new_runner()
+        self._told, self._stage = -1, self._runner.stage
         self._pursuit.reset()
 
     def reset_steering(self) -> None:
@@ -127,10 +128,10 @@ class MazeRunnerNode(SteeringNode):
         for subscription in (self._camera_info, self._odom, self._points):
             self.catch_up(subscription)
         self._header = message.header
-        self._watch.reset()
         camera = self._calibration.camera
         if camera is None:
-            self.stand_still()
+            if self._enabled:
+                self.stand_still()
             cause = f"no direction without a calibration: {self._calibration.fault}"
             self.complain("camera_info", cause, calibration.ADVICE)
             return
@@ -138,6 +139,7 @@ class MazeRunnerNode(SteeringNode):
         self._runner.see_plan(1e-9 * now_ns, plan, camera.x_m)
         self._tell(message.header)
         if self._enabled:
+            self._watch.reset()
             self._drive(message.header, now_ns)
         self.answered(message.header.stamp, began)
 
@@ -154,10 +156,11 @@ class MazeRunnerNode(SteeringNode):
 
     def _drive(self, header: Header, now_ns: int) -> None:
         route, pose = self._runner.route(), self._runner.pose
-        refusal = self.refusal_of_age(now_ns) or (route.reason if pose is None else "")
-        if refusal or pose is None:
+        old = self.refusal_of_age(now_ns)
+        if old or pose is None:
             self.stand_still()
-            self.diagnostics.report(Level.WARN, f"stands still: {refusal}", "look what says odom")
+            advice = self.ADVICE if old else "look what says odom"
+            self.diagnostics.report(Level.WARN, f"stands still: {old or route.reason}", advice)
             return
         place = pose.x, pose.y, pose.yaw
         steering = self._pursuit.update(route.points, place, 1e-9 * now_ns, route.seen)

@@ -271,10 +271,10 @@ class PlanViewMapperNode(VisionNode):
         self._overlay.publish(image_message(header, draw_plan_view(picture, lines, estimate)))
 
     def _tell(self, estimate: PlanViewEstimate) -> None:
-        if estimate.horizon.knocked:
+        if estimate.horizon.knock:
             # Certain in one picture and corrected in the next: who asks later must still find it.
-            self.complain(self._topic, estimate.reason, KNOCK_ADVICE)
-        elif estimate.layers is None:
+            self.complain(self._topic, estimate.horizon.knock, KNOCK_ADVICE)
+        if estimate.layers is None:
             self.diagnostics.report(Level.ERROR, estimate.reason, "nothing is called free until this is over")
         elif estimate.reason:
             self.diagnostics.report(Level.WARN, estimate.reason)

@@ -12,7 +12,7 @@ a fast one. When no steering comes within `lockstep_timeout`, the vehicle goes o
 stops when that is older than `timeout` of simulated time.
 
 Otherwise simulated time runs with real time, or slower where pictures cannot be made fast enough. None is made while
-nobody listens to them.
+nobody listens to them; who comes later than others sees other noise.
 """
 
 from __future__ import annotations

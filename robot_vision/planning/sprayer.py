@@ -145,15 +145,15 @@ class SprayPlanner:
             ahead of the middle, or ends behind it, where the middle itself is too near.
         """
         half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
-        wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii + self.safety
+        unsure = np.maximum(np.linalg.det(plants.covariance), 0.0) ** 0.25
+        reach = plants.radii + self.safety + _CAUTION * unsure
+        wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + reach
         crop = np.flatnonzero((plants.kinds != PlantKind.WEED) & wide)
         if not len(crop) or not len(weeds):
             return -half, half
         aside = np.abs(plants.places[crop, 1, None] - self.middles[None, :]) - 0.5 * self.width
-        unsure = np.linalg.det(plants.covariance[crop]) ** 0.25
-        reach = (plants.radii[crop] + self.safety + _CAUTION * unsure)[:, None]
-        near = aside < reach
-        chord = np.sqrt(np.maximum(reach**2 - np.maximum(aside, 0.0) ** 2, 0.0))
+        near = aside < reach[crop, None]
+        chord = np.sqrt(np.maximum(reach[crop, None] ** 2 - np.maximum(aside, 0.0) ** 2, 0.0))
         away = (plants.places[None, crop, 0] - plants.places[weeds, None, 0])[:, :, None]
         behind = np.where(near & (away < 0.0), away + chord, -np.inf).max(axis=1)
         before = np.where(near & (away >= 0.0), away - chord, np.inf).min(axis=1)

@@ -15,7 +15,7 @@ from robot_vision.planning import Maze
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "planning"))
 
-from seen_mazes import CAMERA, EYE, WALL, directions_from, plan_from  # noqa: E402
+from seen_mazes import CAMERA, EYE, WALL, directions_from, plan_from  # noqa: E402  (drawn for the planner)
 
 Shadow = tuple[float, float]
 

@@ -167,6 +167,20 @@ def test_in_the_dark_nothing_is_free_and_light_brings_everything_back(level: int
     assert again.clearance == np.inf
 
 
+def test_a_camera_that_hangs_is_told_as_soon_as_the_robot_has_moved_and_nothing_is_free() -> None:
+    mapper = PlanViewMapper()
+    same = picture()
+    for number, x in enumerate((0.0, 0.02, 0.1, 0.2, 0.3)):
+        estimate = mapper.update(same, LINES, POINTS, CAMERA, 0.1 * number, Pose(x, 0.0, 0.0))
+        hangs = x > 0.05
+        assert ("stays the same while the robot moves" in estimate.reason) is hangs
+        assert (estimate.plan_view.cells == -1).all() == (estimate.clearance is None) == hangs
+        assert estimate.mapped is not hangs
+    again = mapper.update(picture(0.4), LINES, POINTS, CAMERA, 0.5, Pose(0.4, 0.0, 0.0))
+    assert again.clearance is not None and again.clearance > 4.0
+    assert [cell(again, x, 0.0) for x in (1.5, 3.0)] == [0, 0]
+
+
 def test_a_knocked_camera_is_told_and_measured_by_until_then_nothing_is_free() -> None:
     mapper = PlanViewMapper()
     for number in range(5):

@@ -14,8 +14,8 @@ from robot_vision.simulation.maze import grown
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench import maze_nodes  # noqa: E402  (not installed)
-from bench.maze_drives import CELL_M, contest_maze, drive  # noqa: E402
-from bench.sources import MissingSetError  # noqa: E402
+from bench.maze_drives import CELL_M, contest_maze, drive  # noqa: E402  (not installed)
+from bench.sources import MissingSetError  # noqa: E402  (not installed)
 
 
 def test_the_nodes_drive_through_a_maze_without_touching_a_wall() -> None:

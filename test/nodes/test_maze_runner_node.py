@@ -24,7 +24,7 @@ from robot_vision.ros import floor_messages, messages
 
 sys.path.insert(0, str(FilePath(__file__).resolve().parents[1] / "planning"))
 
-from seen_mazes import CAMERA, plan_from  # noqa: E402
+from seen_mazes import CAMERA, plan_from  # noqa: E402  (drawn for the library)
 
 HALL = Maze.parse("+---+---+---+\n| S       G |\n+---+---+---+\n")
 STEP_NS = 200_000_000
@@ -59,6 +59,16 @@ class Robot:
         self.bench.say_surely("plan_view", floor_messages.plan_to_message(header, seen, "base_link"))
         answer: TwistStamped = self.bench.answer("steering", header)
         return answer
+
+    def watch(self) -> None:
+        """The same, from a place farther on, for a runner that steers nothing: it says where the robot is."""
+        self.x += 0.02
+        header = self.header = self.bench.header("base_link", STEP_NS)
+        self.bench.say_surely("odom", odometry(header, self.x - 0.5))
+        self.bench.say_surely("vanishing_points", messages.vanishing_points_to_message(header, None))
+        seen = plan_from(HALL, Pose(self.x, 0.5, 0.0))
+        self.bench.say_surely("plan_view", floor_messages.plan_to_message(header, seen, "base_link"))
+        self.bench.answer("pose", header)
 
     def drive(self) -> TwistStamped:
         """Go on in steps, in each a picture of its own, until the runner says to drive."""
@@ -167,6 +177,10 @@ def test_disabled_it_stands_and_enabled_it_goes_on(robot: Robot) -> None:
     bench = robot.bench
     assert bench.call(SetBool, "enable", SetBool.Request(data=False)).success
     bench.until(lambda: is_still(bench.said("steering")[-1]), "it stands still")
+    count = len(bench.said("steering"))
+    for _ in range(3):
+        robot.watch()
+    assert len(bench.said("steering")) == count, "whoever drives it by hand would be stopped"
     assert bench.call(SetBool, "maze_runner/enable", SetBool.Request(data=True)).success
     robot.drive()
 

@@ -62,6 +62,18 @@ def test_the_next_row_is_not_believed_and_what_goes_on_is() -> None:
     assert filter_.update(np.array([0.01, 0.0, 0.0]), SIGMA)
 
 
+def test_what_is_doubted_counts_less_begins_nothing_and_passes_no_wider_gate() -> None:
+    assert not RowFilter().update(np.zeros(3), SIGMA, 10.0)
+    believing, doubting = RowFilter(), RowFilter()
+    for filter_, doubt in ((believing, 1.0), (doubting, 10.0)):
+        assert filter_.update(np.zeros(3), SIGMA)
+        filter_.predict(Motion(0.1, 1.5, 0.0))
+        assert filter_.update(np.array([0.01, 0.0, 0.0]), SIGMA, doubt)
+        filter_.predict(Motion(0.1, 1.5, 0.0))
+        assert not filter_.update(np.array([0.0, 0.1, 0.0]), SIGMA, doubt)
+    assert abs(doubting.state[0]) < 0.5 * abs(believing.state[0])
+
+
 def test_what_is_not_seen_grows_uncertain_faster_without_odometry() -> None:
     with_it, without = RowFilter(), RowFilter()
     for filter_, motion in ((with_it, Motion(0.1, 1.5, 0.0)), (without, Motion(0.1))):

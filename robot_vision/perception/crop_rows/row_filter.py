@@ -125,15 +125,18 @@ class RowFilter:
         f.P = move @ f.P @ move.T + noise
         self._common_gain = 1.0 - keep**2
 
-    def update(self, measured: Array, covariance: Array) -> bool:
+    def update(self, measured: Array, covariance: Array, doubt: float = 1.0) -> bool:
         """Take in what a picture says; returns whether it is believed.
 
         Args:
             measured: (3,) offset (m), yaw (rad), curvature (1/m).
             covariance: (3, 3) of it.
+            doubt: factor on the covariance of what has passed the gate; nothing begins with what is doubted.
         """
         f = self._filter
         if f is None:
+            if doubt > 1.0:
+                return False
             self._begin(measured, covariance)
             return True
         # New plants bring a new common error, as large as this picture's
@@ -143,7 +146,7 @@ class RowFilter:
         surprise = measured - (see @ f.x)[:, 0]
         if float(surprise @ np.linalg.solve(expected, surprise)) > self.gate:
             return False
-        f.R = (1.0 - self.shared) * covariance
+        f.R = (doubt - self.shared) * covariance
         f.H = see
         f.update(measured[:, None])
         f.P = 0.5 * (f.P + f.P.T)

@@ -30,7 +30,8 @@ _BORNE_OUT = 0.75
 #: Bits of plants that are asked, the largest ones; fewer than the least say nothing.
 _MOST_BITS, _LEAST_BITS = 100, 25
 #: By how much more plants must agree on another heading, and how far off it must be (rad), to contradict one. Of
-#: drawn fields with as many weeds as plants and 2 degrees of lean, one good fit in a hundred falls below.
+#: drawn fields with as many weeds as plants and 2 degrees of lean, 2 of 86 good fits are contradicted and 54 of 94
+#: bad ones.
 _MORE, _OFF = 0.05, float(np.deg2rad(2.0))
 
 

@@ -166,11 +166,12 @@ class RowTracker:
         expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
         rows = nearest_row(rows, expected)
         dissent = self._dissent(pieces, rows, camera)
-        if dissent:
-            rows = replace(rows, covariance=_DISSENT * rows.covariance)
-        if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3]):
-            self._look_along(pieces, camera, self._start(), motion)
-            return self._without("what stands in this picture does not go on from the rows before")
+        doubt = _DISSENT if dissent else 1.0
+        if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3], doubt):
+            if self.row_filter.knows:
+                self._look_along(pieces, camera, self._start(), motion)
+            return self._without(dissent or "what stands in this picture does not go on from the rows before")
+        rows = replace(rows, covariance=doubt * rows.covariance)
         self._refused = 0
         self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, motion)
