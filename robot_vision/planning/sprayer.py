@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 #: A nozzle is meant for a weed when its lane covers this share of the weed's radius about its middle, or so much, m.
 _AIM, _LEAST_AIM = 0.5, 0.008
-#: From what may be crop so many standard deviations of its place are kept as well.
-_CAUTION = 0.5
+#: From what may be crop at least so many standard deviations of its place are kept.
+_CAUTION = 1.0
 #: Slower than this nobody can say when a weed comes under the nozzle, m/s.
 _SLOWEST = 0.05
 
@@ -146,7 +146,7 @@ class SprayPlanner:
         """
         half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
         unsure = np.maximum(np.linalg.det(plants.covariance), 0.0) ** 0.25
-        reach = plants.radii + self.safety + _CAUTION * unsure
+        reach = plants.radii + np.maximum(self.safety, _CAUTION * unsure)
         wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + reach
         crop = np.flatnonzero((plants.kinds != PlantKind.WEED) & wide)
         if not len(crop) or not len(weeds):
