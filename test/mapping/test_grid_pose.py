@@ -86,6 +86,44 @@ def test_edges_of_shadows_are_told_from_feet_of_walls(shadow: Shadow) -> None:
     assert learnt == pytest.approx(shadow, abs=0.04)
 
 
+LANE = Maze.parse(
+    "+---+---+---+---+---+---+---+---+---+---+---+\n"
+    "| S                                         |\n"
+    "+---+---+---+---+---+---+---+---+---+---+   +\n"
+    "|                                         G |\n"
+    "+---+---+---+---+---+---+---+---+---+---+---+\n"
+)
+
+
+@pytest.mark.parametrize(("seed", "wheels"), [(2, -0.015), (3, -0.015), (2, 0.015), (3, 0.015)])
+def test_at_the_end_of_a_long_corridor_a_shadow_is_not_taken_for_what_odometry_lost(
+    seed: int, wheels: float
+) -> None:
+    random = np.random.default_rng(seed)
+    way = [Pose(0.5 + 0.2 * step, 1.5, 0.0) for step in range(51)]
+    way += [Pose(10.5, 1.5, -turn) for turn in np.arange(0.0, np.pi / 2, 0.25)]
+    way += [Pose(10.5, 1.5 - 0.1 * step, -np.pi / 2) for step in range(11)]
+    way += [Pose(10.5, 0.5, -np.pi / 2 - turn) for turn in np.arange(0.0, np.pi / 2, 0.25)]
+    back = [Pose(10.5 - 0.2 * step, 0.5, -np.pi) for step in range(8)]
+    pose = GridPose(way[0], 1.0, WALL)
+    odometry = Pose(0.0, 0.0, 0.0)
+    pose.move(0.0, odometry)
+    for number, (before, now) in enumerate(zip([*way, *back], [*way[1:], *back], strict=False), start=1):
+        step = before.inverse.then(now)
+        odometry = odometry.then(Pose((1.0 + wheels) * step.x, (1.0 + wheels) * step.y, step.yaw))
+        stamp = 0.1 * number
+        pose.move(stamp, odometry)
+        pose.see_directions(
+            stamp, directions_from(now.yaw + random.normal(0.0, 0.003)), np.full(2, 0.004), CAMERA
+        )
+        shadow = (-0.2, -0.11) if random.random() < 0.5 else (0.0, 0.0)
+        pose.see_plan(stamp, plan_from(LANE, now, 0.02, random, shadow), EYE)
+    told = pose.pose
+    assert told is not None
+    assert told.x == pytest.approx(now.x, abs=0.05)
+    assert abs(told.x - now.x) < 3.0 * pose.sigma[0]
+
+
 def test_a_vanishing_point_far_off_is_not_believed() -> None:
     pose = GridPose(Pose(0.5, 0.5, 0.0), 1.0, WALL)
     pose.move(0.0, Pose(0.0, 0.0, 0.0))
