@@ -92,11 +92,16 @@ class RowExtent:
         place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
         return np.asarray(bare[np.clip(place, 0, _CELLS - 1)])
 
-    def end(self, way: float) -> float | None:
+    def end(self, way: float, reach: float = 0.0) -> float | None:
         """Metres from the robot to where the rows end, negative behind it; None: no end is known.
 
         It is before the first ground that was looked at all along, is as long as no gap may be, and on which next to
         nothing stands in rows. What grows behind that, such as the grass of a meadow, is of no account.
+
+        Args:
+            way: metres the robot has gone.
+            reach: of leaves beyond the last stems, m, where the crop closes: from within, leaves upon leaves cover no
+                more, so its end is not told by their amount.
         """
         known = self._seen > _KNOWN
         if not known.any():
@@ -116,7 +121,7 @@ class RowExtent:
             return None
         first = int(begins[is_open.argmax()])
         last = int(stands[stands < first + _TAIL].max())
-        return float((self._origin + self._sown_until(last + 1, known, usual)) * CELL_M - way)
+        return float((self._origin + self._sown_until(last + 1, known, usual)) * CELL_M - reach - way)
 
     def _sown_until(self, leaves_until: int, known: NDArray[np.bool_], usual: float) -> float:
         """Where the stems end, in stretches, when the last leaves end before stretch `leaves_until`.
@@ -130,8 +135,8 @@ class RowExtent:
         dense = usual
         if known[before].sum() >= _BEFORE // 2:
             dense = max(float(cover[before][known[before]].mean()), _LEAST_DENSE * usual)
-        length = float(cover[begin : leaves_until + 1].sum()) / dense
-        return begin + float(np.clip(length, 0.0, leaves_until - begin))
+        stretches = np.minimum(cover[begin : leaves_until + 1] / dense, 1.0)
+        return begin + float(np.clip(stretches.sum(), 0.0, leaves_until - begin))
 
     def _mean_cover(self, known: NDArray[np.bool_]) -> Array:
         """Cover of each stretch: neighbours together, as single plants are missing everywhere."""
