@@ -21,6 +21,10 @@ _OPEN = 0.15
 """Share of the usual cover that open ground has at most, all in all."""
 _TAIL = 3
 """So many stretches of open ground may still hold the last plants of rows."""
+_LAST, _BEFORE = 4, 8
+"""Stretches that make up the last metre of rows, and those before it that tell how densely it is sown."""
+_LEAST_DENSE = 0.5
+"""Rows are sown at least so densely, as a share of the usual cover."""
 _NEAR_M, _ENOUGH = 3.0, 6
 """Ground before the robot, and stretches of it, that tell what is usual."""
 _FARTHEST = 0.15
@@ -88,19 +92,21 @@ class RowExtent:
         place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
         return np.asarray(bare[np.clip(place, 0, _CELLS - 1)])
 
-    def end(self, way: float) -> float | None:
+    def end(self, way: float, reach: float = 0.0) -> float | None:
         """Metres from the robot to where the rows end, negative behind it; None: no end is known.
 
         It is before the first ground that was looked at all along, is as long as no gap may be, and on which next to
         nothing stands in rows. What grows behind that, such as the grass of a meadow, is of no account.
+
+        Args:
+            way: metres the robot has gone.
+            reach: of leaves beyond the last stems, m, where the crop closes: from within, leaves upon leaves cover no
+                more, so its end is not told by their amount.
         """
         known = self._seen > _KNOWN
         if not known.any():
             return None
-        # Single plants are missing everywhere: neighbours are looked at together
-        cover = np.convolve(
-            np.where(known, self._cover / np.maximum(self._seen, 1e-9), 0.0), _WEIGHTS, "same"
-        )
+        cover = self._mean_cover(known)
         usual = self._usual(cover, known, way)
         stands = np.flatnonzero(known & (cover > self.sparse * usual))
         length = int(np.ceil(self.gap / CELL_M))
@@ -115,7 +121,22 @@ class RowExtent:
             return None
         first = int(begins[is_open.argmax()])
         last = int(stands[stands < first + _TAIL].max())
-        return float((self._origin + last + 1) * CELL_M - way)
+        return float((self._origin + self._sown_until(last + 1, known, usual)) * CELL_M - reach - way)
+
+    def _sown_until(self, leaves_until: int, known: NDArray[np.bool_], usual: float) -> float:
+        """Where the stems end, in stretches, when the last leaves end before stretch `leaves_until`.
+
+        Leaves reach beyond the last stems, and tall ones are seen farther off than they are: the last metre of rows
+        is as long as what grows there, were it to stand as densely as in the metres before.
+        """
+        cover = self._cover / np.maximum(self._seen, 1e-9)
+        begin = max(leaves_until - _LAST, 0)
+        before = slice(max(begin - _BEFORE, 0), begin)
+        dense = usual
+        if known[before].sum() >= _BEFORE // 2:
+            dense = max(float(cover[before][known[before]].mean()), _LEAST_DENSE * usual)
+        stretches = np.minimum(cover[begin : leaves_until + 1] / dense, 1.0)
+        return begin + float(np.clip(stretches.sum(), 0.0, leaves_until - begin))
 
     def _mean_cover(self, known: NDArray[np.bool_]) -> Array:
         """Cover of each stretch: neighbours together, as single plants are missing everywhere."""

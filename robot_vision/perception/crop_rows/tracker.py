@@ -103,6 +103,7 @@ class RowTracker:
     _refused: int = field(default=0, init=False, repr=False, compare=False)
     _unseen: float = field(default=0.0, init=False, repr=False, compare=False)
     _blind: bool = field(default=False, init=False, repr=False, compare=False)
+    _reach: float = field(default=0.0, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.spacing) and self.spacing > 0.0):
@@ -120,7 +121,7 @@ class RowTracker:
         """Forget everything earlier pictures told."""
         self.row_filter.reset()
         self.extent.reset()
-        self._way = self._unseen = 0.0
+        self._way = self._unseen = self._reach = 0.0
         self._refused = 0
 
     def update(self, picture: Picture, camera: Camera, motion: Motion) -> RowEstimate:
@@ -151,6 +152,9 @@ class RowTracker:
         cell = _CELL_PX * max(1, picture.shape[1] // 640)
         pieces = pieces_of(mask, camera, cell)
         covered = self._covered(pieces, camera)
+        if self._end() is None:
+            # Leaves that close meet midway between their rows; later on the open ground behind is in view
+            self._reach = 0.5 * self.spacing if covered >= _CLOSED else 0.0
         told = (
             pieces
             if covered < _CLOSED
@@ -175,7 +179,7 @@ class RowTracker:
         self._refused = 0
         self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, motion)
-        return RowEstimate(self._lane(), dissent, True, rows, self.extent.end(self._way))
+        return RowEstimate(self._lane(), dissent, True, rows, self._end())
 
     def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
         """What single plants (20.11)-(20.15) have against the rows fitted to all of them; empty when nothing."""
@@ -191,6 +195,9 @@ class RowTracker:
             return ""
         return f"single plants say the robot heads {np.rad2deg(other - yaw):+.0f} degrees off what their rows say"
 
+    def _end(self) -> float | None:
+        return self.extent.end(self._way, self._reach)
+
     def _start(self) -> Array:
         """What a picture should show, (6,): as predicted, the body upright."""
         return np.array([*self.row_filter.expected(), 0.0, 0.0, -0.02])
@@ -199,9 +206,10 @@ class RowTracker:
         """Leave out what grows in known gaps and where the rows are over: weeds, and the grass of the headland."""
         x, _ = ground_places(pieces.rays, camera, self._start())
         here = ~self.extent.is_open(self._way, x)
-        end = self.extent.end(self._way)
+        end = self._end()
         if end is not None:
-            here &= x < end + CELL_M
+            # Beyond the last stems bare ground lies between no plants, while their leaves still tell
+            here &= x < end + (0.0 if pieces.aside else CELL_M)
         return Pieces(pieces.rays[here], pieces.weight[here], pieces.aside)
 
     def _covered(self, pieces: Pieces, camera: Camera) -> float:
