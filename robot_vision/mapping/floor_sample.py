@@ -51,7 +51,8 @@ class FloorSample:
         """Choose the sample of the first picture (H - view.top, W).
 
         The lower part of it is floor for want of anything better. What reaches in from above and looks different may be
-        the foot of a thing: learnt once, its tint would be floor from then on.
+        the foot of a thing: learnt once, its tint would be floor from then on. A floor too motley to
+        tell is taken whole.
 
         Args:
             lab: (H - view.top, W, 3) the part of the working picture that shows ground, CIE Lab of OpenCV.
