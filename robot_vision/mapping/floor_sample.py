@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,8 +13,6 @@ from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.pose import Pose
 
 Mask = NDArray[np.bool_]
-_SPECK = 5
-"""Side of what is too small to be floor before a thing, working pixels."""
 STRANGE = "what is just before the robot looks like no floor seen so far"
 
 
@@ -115,8 +112,6 @@ class FloorSample:
 def _from_above(like: Mask) -> Mask:
     """What reaches down from above (H, W) in columns of a picture before anything is like the floor.
 
-    New tints among those of the floor are floor, too; what comes in from above may be the foot of a wall, or a thing,
-    and specks of the floor's tints on it do not end it.
+    New tints among those of the floor are floor, too; what comes in from above may be the foot of a wall.
     """
-    lasting = cv2.morphologyEx(like.astype(np.uint8), cv2.MORPH_OPEN, np.ones((_SPECK, _SPECK), np.uint8))
-    return ~np.logical_or.accumulate(lasting > 0, axis=0)
+    return ~np.logical_or.accumulate(like, axis=0)

@@ -98,17 +98,6 @@ def test_specks_among_floor_are_learnt_and_what_reaches_in_from_above_is_not() -
     assert sample[height - 10, 173]
 
 
-def test_specks_of_the_floors_tint_on_a_thing_do_not_make_the_rest_of_it_floor() -> None:
-    shown = ground()
-    height = len(shown)
-    shown[: height - 10, 170:186] = THING
-    shown[height - 30 : height - 27, 172:184] = FLOOR
-    sample, _ = FloorSample().choose(shown, looks(), VIEW, START)
-    assert sample is not None
-    assert not sample[height - 20, 178]
-    assert sample[height - 5, 178]
-
-
 def test_of_a_floor_half_covered_only_what_looks_like_floor_is_learnt() -> None:
     shown = ground()
     shown[:, :140] = THING
