@@ -29,7 +29,6 @@ class FloorSample:
         alike: share of the sample that must look like floor, or it is strange.
         sure: share of it that looks like floor beyond which new tints among it are floor, too.
         over: way over strange floor after which it is floor, as a multiple of the camera's height.
-        nearest: share of the sample's rows that the first picture takes for floor without asking.
     """
 
     lowest: float = 0.62
@@ -37,40 +36,16 @@ class FloorSample:
     alike: float = 0.3
     sure: float = 0.9
     over: float = 2.5
-    nearest: float = 0.5
     _unlike: Pose | None = field(default=None, init=False, repr=False)
 
     def reset(self) -> None:
         """Forget where a strange floor began."""
         self._unlike = None
 
-    def begin(self, lab: NDArray[np.uint8], above: NDArray[np.uint8], view: GroundView) -> Mask:
-        """Choose the sample of the first picture (H - view.top, W).
-
-        The lower part of it is floor for want of anything better. What reaches in from above and looks different may be
-        the foot of a thing: learnt once, its tint would be floor from then on. A floor too motley to
-        tell is taken whole.
-
-        Args:
-            lab: (H - view.top, W, 3) the part of the working picture that shows ground, CIE Lab of OpenCV.
-            above: (K, W, 3) the part above the horizon.
-            view: of the ground in the working picture.
-        """
-        sample, rows = self._before_robot(view)
-        nearest = sample.copy()
-        nearest[: sample.shape[0] - round(self.nearest * rows)] = False
-        first = FloorAppearance()
-        first.learn(lab, nearest, above)
-        like = np.asarray(first.score(lab[-rows:]) > 0.0)
-        part = sample[-rows:]
-        if part.any() and like[part].mean() >= self.alike:
-            part &= ~_from_above(like)
-        return sample
-
     def choose(
         self, lab: NDArray[np.uint8], appearance: FloorAppearance, view: GroundView, pose: Pose | None
     ) -> tuple[Mask | None, str]:
-        """Choose the sample of a later picture.
+        """Choose the sample.
 
         Args:
             lab: (H - view.top, W, 3) the part of the working picture that shows ground, CIE Lab of OpenCV.
@@ -81,14 +56,18 @@ class FloorSample:
         Returns:
             The sample (H - view.top, W), None when nothing must be learnt, and why the floor is strange, empty when it
             is not.
-
-        Raises:
-            ValueError: nothing has been learnt yet.
         """
-        sample, rows = self._before_robot(view)
+        rows, columns = view.shape
         height = view.camera.height_m or 1.0
-        part = sample[-rows:]
-        like = np.asarray(appearance.score(lab[-rows:]) > 0.0)
+        first = view.top + int(self.lowest * (rows - view.top))
+        v = np.arange(first, rows, dtype=np.float64)
+        _, y = view.ground(*np.meshgrid(np.arange(columns, dtype=np.float64), v))
+        sample = np.zeros(lab.shape[:2], bool)
+        part = sample[-len(v) :]
+        part[:] = np.abs(y) < self.half_width * height
+        if not appearance.knows:
+            return sample, ""
+        like = np.asarray(appearance.score(lab[-len(v) :]) > 0.0)
         share = float(like[part].mean()) if part.any() else 0.0
         if share < self.alike:
             self._unlike = self._unlike or pose
@@ -97,16 +76,6 @@ class FloorSample:
         self._unlike = None
         part &= like if share <= self.sure else ~_from_above(like)
         return sample, ""
-
-    def _before_robot(self, view: GroundView) -> tuple[Mask, int]:
-        """The floor just before the robot (H - view.top, W), and in how many of the lowest rows it lies."""
-        rows, columns = view.shape
-        first = view.top + int(self.lowest * (rows - view.top))
-        v = np.arange(first, rows, dtype=np.float64)
-        _, y = view.ground(*np.meshgrid(np.arange(columns, dtype=np.float64), v))
-        sample = np.zeros((rows - view.top, columns), bool)
-        sample[-len(v) :] = np.abs(y) < self.half_width * (view.camera.height_m or 1.0)
-        return sample, len(v)
 
 
 def _from_above(like: Mask) -> Mask:

@@ -272,14 +272,10 @@ class PlanViewMapper:
 
     def _learn(self, lower: Picture, lab: Picture, view: GroundView, pose: Pose | None) -> str:
         """Learn the floor just before the robot; say so if it looks like no floor that is known."""
-        part, above = lab[view.top :], lab[: max(view.top, 1)]
-        sample: NDArray[np.bool_] | None
-        if self.appearance.knows:
-            sample, strange = self.sample.choose(part, self.appearance, view, pose)
-        else:
-            sample, strange = self.sample.begin(part, above, view), ""
+        part = lab[view.top :]
+        sample, strange = self.sample.choose(part, self.appearance, view, pose)
         if sample is not None:
-            self.appearance.learn(part, sample, above)
+            self.appearance.learn(part, sample, lab[: max(view.top, 1)])
             self.shadows.learn(lower, sample)
         return strange
 

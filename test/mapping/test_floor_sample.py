@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from corridor_pictures import CAMERA
 from numpy.typing import NDArray
 
@@ -14,8 +13,7 @@ from robot_vision.mapping.floor_sample import STRANGE, FloorSample
 from robot_vision.mapping.ground_view import GroundView
 
 VIEW = GroundView(CAMERA, 0.5)
-FLOOR, THING, DARK = (120, 128, 128), (40, 160, 150), (40, 128, 128)
-ABOVE = np.full((20, 320, 3), 250, np.uint8)
+FLOOR, THING = (120, 128, 128), (40, 160, 150)
 START = Pose(0.0, 0.0, 0.0)
 
 
@@ -28,42 +26,20 @@ def ground(colour: tuple[int, int, int] = FLOOR) -> NDArray[np.uint8]:
 def looks() -> FloorAppearance:
     """The looks of a floor that is known."""
     appearance = FloorAppearance()
-    appearance.learn(ground(), FloorSample().begin(ground(), ABOVE, VIEW), ABOVE)
+    sample, strange = FloorSample().choose(ground(), appearance, VIEW, None)
+    assert sample is not None and strange == ""
+    appearance.learn(ground(), sample, np.full((20, 320, 3), 250, np.uint8))
     return appearance
 
 
 def test_the_first_sample_is_the_ground_just_before_the_robot() -> None:
-    sample = FloorSample().begin(ground(), ABOVE, VIEW)
+    sample, _ = FloorSample().choose(ground(), FloorAppearance(), VIEW, None)
+    assert sample is not None
     rows, columns = np.nonzero(sample)
     x, y = VIEW.ground(columns.astype(float), rows + float(VIEW.top))
     assert np.abs(y).max() < 0.6 * (CAMERA.height_m or 0.0)
     assert x.max() < 2.0
     assert sample[-1, 160]
-
-
-def test_the_foot_of_a_thing_that_reaches_into_the_first_sample_is_not_learnt() -> None:
-    shown = ground()
-    height = len(shown)
-    foot = height - int(0.38 * height) + 8
-    shown[:foot, 150:180] = DARK
-    appearance = FloorAppearance()
-    sample = FloorSample().begin(shown, ABOVE, VIEW)
-    appearance.learn(shown, sample, ABOVE)
-    assert not sample[:foot, 150:180].any()
-    assert sample[foot, 165] and sample[foot - 4, 140]
-    score = appearance.score(shown)
-    assert (score[:foot, 150:180] < 0.0).all() and (score[foot:] > 0.0).all()
-
-
-def test_a_first_picture_so_motley_that_nothing_can_be_told_of_it_is_learnt_whole() -> None:
-    motley = np.random.default_rng(0).integers(0, 255, ground().shape, dtype=np.uint8)
-    whole = FloorSample().begin(ground(), ABOVE, VIEW)
-    assert (FloorSample().begin(motley, ABOVE, VIEW) == whole).all()
-
-
-def test_before_anything_is_learnt_nothing_is_like_the_floor() -> None:
-    with pytest.raises(ValueError, match="learnt"):
-        FloorSample().choose(ground(), FloorAppearance(), VIEW, START)
 
 
 def test_what_suddenly_stands_there_is_learnt_only_after_the_robot_has_driven_over_it() -> None:
