@@ -29,6 +29,8 @@ _FOOT_SIGMA = 0.0015
 _SIDES = (1, -1)
 #: Uprights on a side that are together shorter than this share of its longest floor line tell nothing of its foot.
 _FEW_UPRIGHTS = 0.3
+#: Share of the uprights of a side (by length) that things before its wall may have, where a line tells the wall's foot.
+_MOST_BEFORE_WALL = 0.5
 #: Squared Mahalanobis distance (1 degree of freedom) beyond which a line is not the foot expected: 3 sigma.
 _GATE = 9.0
 #: Lines that differ by less in it are about as near.
@@ -286,13 +288,7 @@ class LaneFilter:
         support = closeness @ weight
         strong = support >= np.maximum(self.least_share * support.max(), evidence.least)
         strong &= support >= self.least_cover * shown
-        wall = self._wall(side * evidence.bottoms, evidence.bottom_weight, float(weight.max()))
-        if wall is not None:
-            # A skirting of height h shows its upper edge as if it were H / (H - h) times as far out.
-            skirting = min(self.tallest_skirting / evidence.height, 0.5)
-            strong &= (away > (1.0 - skirting - self.cluster) * wall) & (
-                away < (1.0 + 2.0 * self.cluster) * wall
-            )
+        strong = self._before_uprights(strong, away, float(weight.max()), evidence, side)
         if not strong.any():
             return None
         # Of lines that are about as near the place expected, the innermost.
@@ -309,6 +305,30 @@ class LaneFilter:
         rivals *= (1.0 if expected is not None else doubt) / (support[foot] + rivals.sum())
         torn = float(rivals @ (away - place) ** 2)
         return _Foot(side * place, float(np.sqrt(own**2 + torn)), doubt)
+
+    def _before_uprights(
+        self, strong: NDArray[np.bool_], away: Array, longest_line: float, evidence: FloorEvidence, side: int
+    ) -> NDArray[np.bool_]:
+        """Those of the strong lines (N,) of one side at which its uprights begin; all where there are too few to tell.
+
+        Where none begin at the nearest ones, these are those of a thing on the floor: then a line counts on which
+        enough of the uprights stand, if it is not before the wall that most of them stand.
+        """
+        bottoms, weight = side * evidence.bottoms, evidence.bottom_weight
+        wall = self._wall(bottoms, weight, longest_line)
+        if wall is None:
+            return strong
+        # A skirting of height h shows its upper edge as if it were H / (H - h) times as far out.
+        skirting = min(self.tallest_skirting / evidence.height, 0.5)
+        inner, outer = 1.0 - skirting - self.cluster, 1.0 + 2.0 * self.cluster
+        there = strong & (away > inner * wall) & (away < outer * wall)
+        if there.any() or not strong.any():
+            return there
+        weight = np.where(bottoms > 0.0, weight, 0.0)
+        before = (bottoms < away[:, None] / outer) @ weight
+        standing = (bottoms < away[:, None] / inner) @ weight - before
+        enough = standing > _FEW_UPRIGHTS * longest_line
+        return np.asarray(strong & enough & (before <= _MOST_BEFORE_WALL * weight.sum()))
 
     def _wall(self, bottoms: Array, weight: Array, longest_line: float) -> float | None:
         """Lateral distance at which the uprights of one side begin, m; None when there are too few to tell."""

@@ -29,6 +29,7 @@ class Corridor:
         walls: the sides whose lines are seen, +1 left, -1 right.
         doors: distance between doors on each side.
         lamps: places (to the left) of edges of lamps that run along the ceiling.
+        boxes: that stand on the floor: places (along, to the left) of the middle of the front, width and height.
     """
 
     width: float = 2.0
@@ -39,6 +40,7 @@ class Corridor:
     walls: tuple[int, ...] = (1, -1)
     doors: float = 3.0
     lamps: tuple[float, ...] = ()
+    boxes: tuple[tuple[float, float, float, float], ...] = ()
 
     def edges(self) -> Array:
         """(N, 2, 3) edges in space, cut at the doors."""
@@ -57,6 +59,10 @@ class Corridor:
         found += [[(x, y, self.height), (x + 3.0, y, self.height)] for x in (2.0, 8.0) for y in self.lamps]
         if self.joint is not None:
             found += [[(x, self.joint, 0.0), (x + 4.0, self.joint, 0.0)] for x in (0.0, 5.0, 10.0)]
+        for x, middle, width, height in self.boxes:
+            sides = (middle - width / 2, middle + width / 2)
+            found += [[(x, y, 0.0), (x, y, height)] for y in sides]
+            found += [[(x, sides[0], z), (x, sides[1], z)] for z in (0.0, height)]
         return np.array(found)
 
 

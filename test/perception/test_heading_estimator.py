@@ -178,6 +178,22 @@ def test_clutter_is_no_wall(seed):
     assert not any(answer.lane.offset_known for answer in answers[25:] if answer.lane is not None)
 
 
+@pytest.mark.parametrize("offset", [0.48, -0.48])
+def test_the_uprights_of_a_box_in_the_way_hide_no_wall(offset):
+    boxed = Corridor(boxes=((3.0, 0.0, 0.5, 1.2),))
+    answers = follow(HeadingEstimator(), boxed, offset, 0.0)
+    lane = answers[-1].lane
+    assert lane is not None and lane.offset_known
+    assert lane.offset == pytest.approx(offset, abs=0.03)
+    assert lane.width == pytest.approx(2.0, abs=0.06)
+
+
+def test_a_box_before_a_wall_that_is_not_seen_is_no_wall():
+    boxed = Corridor(boxes=((3.0, 0.0, 0.5, 1.2),), walls=(1,), lamps=LAMPS)
+    answers = follow(HeadingEstimator(), boxed, 0.48, 0.0, pictures=30)
+    assert not any(answer.lane.offset_known for answer in answers if answer.lane is not None)
+
+
 def on_the_floor(left: float, first: float, last: float, offset: float, yaw: float) -> NDArray[np.float64]:
     """Ends (4,) px of a line along the corridor, `left` of its middle, from `first` to `last` m ahead."""
     points = np.array([[first, left - offset, 0.0], [last, left - offset, 0.0]])
