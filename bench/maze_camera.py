@@ -21,6 +21,7 @@ import numpy as np
 from bench.maze_drives import contest_maze
 from bench.report import Cell, Row, Table, at_least, at_most
 from robot_vision.control import PathPursuit
+from robot_vision.demo.maze_drive import DRIVE
 from robot_vision.mapping import PlanViewMapper, Pose
 from robot_vision.perception import HeadingEstimator, LineDetector
 from robot_vision.planning import Exploration, Maze, MazeExplorer, MazeRunner
@@ -29,15 +30,6 @@ from robot_vision.simulation.maze import grown, maze_world
 
 CELL_M = 1.0
 """At this size the camera sits 0.33 m over the floor, the walls are 0.28 m high."""
-DRIVE = {
-    "speed": 0.9,
-    "lookahead": 0.33,
-    "most_turn_rate": 2.0,
-    "most_acceleration": 1.8,
-    "most_turn_acceleration": 6.0,
-    "turn_on_spot": 0.5,
-    "latency": 0.18,
-}
 RATE, STRIDE = 15, 3
 """Commands a second, and how many come for each picture."""
 ENTERED = 0.1
