@@ -61,8 +61,9 @@ $(VENV)/.viewer: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[viewer]'
 	@touch $@
 
+# Whole files go to the processes: what a module's tests share is made once, and graphs have domains of their own.
 test: $(STAMP) $(VENV)/.viewer
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGS)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
