@@ -6,13 +6,16 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from robot_vision.bags.errors import BagError
 from robot_vision.geometry import BODY_FROM_OPTICAL, Camera
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 _NOT_A_ROTATION = 1e-2  # largest departure of R R^T from the identity; KITTI's six digits give 1e-6
@@ -89,6 +92,8 @@ def odometry_from_camera(camera_poses: Floats, rate_hz: float, camera: Camera | 
         rate_hz: pictures a second.
         camera: gives its place on the robot.
     """
+    from scipy.spatial.transform import Rotation  # slow to import
+
     base_from_camera = np.eye(4)
     base_from_camera[:3, :3] = BODY_FROM_OPTICAL
     if camera is not None:
@@ -104,6 +109,8 @@ def odometry_from_camera(camera_poses: Floats, rate_hz: float, camera: Camera | 
 
 
 def _twists(positions: Floats, turns: Rotation, rate_hz: float) -> tuple[Floats, Floats]:
+    from scipy.spatial.transform import Rotation
+
     count = len(positions)
     if count < 2:
         return np.zeros((count, 3)), np.zeros((count, 3))

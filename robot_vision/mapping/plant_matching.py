@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift
 from robot_vision.mapping.plant_tracks import PlantTracks
@@ -44,6 +43,8 @@ def matched(
         blobs: (K,) of the picture.
         gate: cost beyond which a plant and a blob are not the same.
     """
+    from scipy.optimize import linear_sum_assignment  # slow to import
+
     if not len(tracks) or not len(blobs):
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
     # what lies behind or aside of all that is seen is none of it

@@ -8,9 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from robot_vision.geometry import ImageEllipse
 from robot_vision.perception.edge_light import light_exponent
@@ -171,6 +168,10 @@ def _chains(points: Array, normals: Array) -> list[NDArray[np.intp]]:
 
     The border of a hole close to the rim of its plate touches that rim, but is bright on the other side.
     """
+    from scipy.sparse import coo_matrix  # slow to import, as the next ones
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(points).query_pairs(_TOUCHING, output_type="ndarray")
     alike = np.einsum("ni,ni->n", normals[pairs[:, 0]], normals[pairs[:, 1]]) > _ACROSS
     first, second = pairs[alike].T

@@ -11,7 +11,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from robot_vision.perception.segments import LineSegments
 
@@ -116,6 +115,8 @@ _REMAP_ROWS = 32000
 def _sample(picture: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[np.float32]:
     """Bilinear samples of a picture at (R, K, 2) places, 0 outside."""
     if max(picture.shape) > _REMAP_ROWS:
+        from scipy.ndimage import map_coordinates  # slow to import
+
         rows_and_columns = np.moveaxis(places[..., ::-1], 2, 0)
         return np.asarray(map_coordinates(picture, rows_and_columns, order=1, mode="grid-constant"))
     parts = [

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 
 class ShadowMap:
@@ -41,6 +40,8 @@ class ShadowMap:
 
     def share(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Share of the light (N,), 0 to 1, that is taken from points (N, 2 or 3)."""
+        from scipy.ndimage import map_coordinates  # slow to import
+
         places = (points[:, 1::-1] - self._low[::-1]) / self._cell
         taken = map_coordinates(self._share, places.T, np.float64, order=1, mode="nearest")
         return np.asarray(taken, np.float64)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc
 
 from robot_vision.perception.vanishing.bundle import Bundle
 
@@ -46,6 +45,8 @@ def false_alarms(
         spent: number of lines that fix the direction.
         tests: number of directions among which this one was chosen.
     """
+    from scipy.special import betainc  # slow to import
+
     away = np.abs(residuals)
     agrees = free & (away < TOLERANCE)
     trials, agreeing = len(bundle) - spent, int(agrees.sum()) - spent

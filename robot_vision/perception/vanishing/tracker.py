@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from robot_vision.geometry import Camera
 from robot_vision.geometry.sphere import angle_between
@@ -154,6 +153,8 @@ class VanishingPointTracker:
 
     def _match(self, observed: VanishingPoints) -> list[Track | None]:
         """The track of each observation, None for those that fit none."""
+        from scipy.optimize import linear_sum_assignment  # slow to import
+
         partner: list[Track | None] = [None] * len(observed)
         if not self._tracks or not len(observed):
             return partner
