@@ -34,6 +34,9 @@ class ShadowFinder:
         longest: length on the floor of a patch as a multiple of its width beyond which it stands up, as long as
             parallax does not tell.
         lying: share of what floor shows by parallax that a patch must show to be floor.
+        doubt: score below which a pixel may be in shadow: of floor that looks much like what it is in the light, shadow
+            makes floor that is doubted.
+        stands: log ratio of parallax from which on a pixel stands above the floor.
         surrounded: share of the upper rim of a patch at which floor must go on.
         memory: share of the old colour of the floor that a picture leaves.
     """
@@ -44,6 +47,8 @@ class ShadowFinder:
     warmth: float = 0.04
     longest: float = 2.0
     lying: float = 0.1
+    doubt: float = 0.2
+    stands: float = 0.3
     surrounded: float = 0.5
     memory: float = 0.9
     _floor: NDArray[np.float32] | None = field(default=None, init=False, repr=False)
@@ -90,7 +95,9 @@ class ShadowFinder:
             parallax: of the same part, None without an earlier picture.
         """
         shadow = np.zeros(score.shape, bool)
-        dim = self.dim(bgr) & (score < 0.0)
+        dim = self.dim(bgr) & (score < self.doubt)
+        stands = shadow if parallax is None else dim & (parallax.raised > self.stands)
+        dim &= ~stands
         count, found, table, _ = cv2.connectedComponentsWithStats(dim.astype(np.uint8), connectivity=4)
         patches, stats = np.asarray(found, np.int32), np.asarray(table, np.int32)
         if count < 2:
@@ -108,7 +115,10 @@ class ShadowFinder:
         flat &= floor > self.surrounded * edge
         if parallax is not None:
             lies = self._lies(patches, count, parallax)
-            flat = np.where(np.isnan(lies), flat, lies > self.lying)
+            beside = np.asarray(cv2.dilate(stands.astype(np.uint8), np.ones((3, 3), np.uint8)), np.bool_)
+            joined = np.bincount(patches[beside], minlength=count) > 0
+            # What hangs together with a thing that stands, as its skirting does, must look like shadow both ways.
+            flat = np.where(np.isnan(lies), flat, (lies > self.lying) & (flat | ~joined))
         flat[0] = False
         return np.asarray(flat[patches])
 
