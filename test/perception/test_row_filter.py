@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, row_cover
+from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, go_on_until, row_cover
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 
 SIGMA = np.diag([0.012, 0.006, 0.001]) ** 2
+SURE = np.zeros((3, 3))
 
 
 def driven(seed: int, steps: int = 60, turned: float = 0.0) -> np.ndarray:
@@ -141,10 +143,54 @@ def test_rows_without_an_end_in_sight_have_none() -> None:
 def test_weeds_between_rows_cancel_what_stands_in_rows() -> None:
     random = np.random.default_rng(1)
     x, area = random.uniform(1.0, 2.0, 4000), np.full(4000, 1e-3)
-    _, anywhere, _ = row_cover(x, random.uniform(-1.25, 1.25, 4000), area, 0.5, 1.25, 1.0, 2.0)
+    _, anywhere, _ = row_cover(x, random.uniform(-1.25, 1.25, 4000), area, 0.5, 1.25, (1.0, 2.0), SURE)
     rows = 0.5 * random.integers(-2, 3, 4000) + random.normal(0.0, 0.02, 4000)
-    _, in_rows, _ = row_cover(x, rows, area, 0.5, 1.25, 1.0, 2.0)
+    _, in_rows, _ = row_cover(x, rows, area, 0.5, 1.25, (1.0, 2.0), SURE)
     assert np.abs(anywhere).max() < 0.15 * in_rows.min()
+
+
+def rows_with_a_gap(bend: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Way ahead and to the side, and area, of bits in five rows from 1 to 4 m and from 7 to 10 m, known to be straight.
+
+    Weeds stand everywhere, a tenth as many.
+    """
+    random = np.random.default_rng(2)
+    x = np.concatenate([random.uniform(1.0, 4.0, 3000), random.uniform(7.0, 10.0, 3000)])
+    aside = 0.5 * random.integers(-2, 3, 6000) + random.normal(0.0, 0.02, 6000) + 0.5 * bend * x**2
+    x = np.concatenate([x, random.uniform(1.0, 10.0, 600)])
+    aside = np.concatenate([aside, random.uniform(-1.25, 1.25, 600)])
+    return x, aside, np.full(6600, 1e-3)
+
+
+def test_rows_far_ahead_are_rows_though_they_lie_beside_where_they_should() -> None:
+    bits = rows_with_a_gap(0.005)  # at 8 m 0.16 m aside: there the wave of straight rows has its trough
+    ahead, sure, _ = row_cover(*bits, 0.5, 1.25, (1.0, 10.0), SURE)
+    _, unsure, _ = row_cover(*bits, 0.5, 1.25, (1.0, 10.0), np.diag([1e-5, 1e-5, 1e-5]))
+    near, gap, far = ahead < 3.5, (ahead > 4.5) & (ahead < 6.5), ahead > 7.5
+    assert sure[far].max() < 0.3 * sure[near].min()
+    assert unsure[far].min() > 0.6 * unsure[near].mean()
+    assert np.abs(unsure[gap]).max() < 0.2 * unsure[near].mean()
+
+
+def test_rows_go_on_until_open_ground_wherever_they_lie() -> None:
+    within, half = (1.0, 10.0), 1.25
+    assert go_on_until(*rows_with_a_gap(0.005), 0.5, half, within) == pytest.approx(4.0, abs=0.5)
+    x, aside, area = rows_with_a_gap(0.0)
+    with_a_gap_of_a_metre = np.where(x < 5.0, x, x - 2.0)
+    assert go_on_until(with_a_gap_of_a_metre, aside, area, 0.5, half, (1.0, 8.0)) == 8.0
+    assert go_on_until(x + 1.5, aside, area, 0.5, half, (1.0, 6.0)) == pytest.approx(
+        5.5, abs=0.5
+    )  # begins late
+    assert go_on_until(x[:0], aside[:0], area[:0], 0.5, half, within) == within[1]
+
+
+def test_an_end_is_not_told_by_one_picture() -> None:
+    extent, ahead = RowExtent(gap=4.0), np.arange(1.0, 9.0, CELL_M) + 0.5 * CELL_M
+    for _ in range(2):
+        assert extent.end(0.0) is None
+        extent.see(0.0, ahead, np.where(ahead < 4.0, 0.1, 0.0), np.ones_like(ahead))
+    extent.see(0.0, ahead, np.where(ahead < 4.0, 0.1, 0.0), np.ones_like(ahead))
+    assert extent.end(0.0) == pytest.approx(4.0, abs=0.5)
 
 
 def test_settings_of_the_extent_are_checked() -> None:

@@ -14,8 +14,8 @@ CELL_M = 0.25
 """Length of a stretch of way, m."""
 _CELLS, _BEHIND = 200, 60
 """Stretches remembered, and how many of them behind the robot."""
-_KNOWN = 0.25
-"""A stretch that was looked at for less says nothing."""
+_KNOWN = 2.0
+"""A stretch that was looked at for less says nothing: the lean of a single picture may be wrong by metres far ahead."""
 _WEIGHTS = np.array([0.25, 0.5, 0.25])
 _OPEN = 0.15
 """Share of the usual cover that open ground has at most, all in all."""
@@ -29,6 +29,14 @@ _NEAR_M, _ENOUGH = 3.0, 6
 """Ground before the robot, and stretches of it, that tell what is usual."""
 _FARTHEST = 0.15
 """A stretch seen from nearer counts for more; the farthest ones for this much."""
+_SIGMAS = 3.0
+"""Rows may lie so many standard deviations beside where they are known to."""
+_ANYWHERE = np.diag([1e3, 0.0, 0.0])
+"""Covariance of rows that may lie anywhere."""
+_PARTED, _THIN = 6, 0.3
+"""Stretches of open ground that part rows, and the share of the usual cover that open ground has at most."""
+_ABOUT = 9
+"""Stretches that tell together where rows lie: fewer, and weeds would be taken for rows."""
 
 
 @dataclass
@@ -152,9 +160,18 @@ class RowExtent:
 
 
 def row_cover(
-    x: Array, aside: Array, area: Array, spacing: float, half_width: float, near: float, far: float
+    x: Array,
+    aside: Array,
+    area: Array,
+    spacing: float,
+    half_width: float,
+    within: tuple[float, float],
+    covariance: Array,
 ) -> tuple[Array, Array, Array]:
     """Cover of the ground by rows, stretch by stretch ahead.
+
+    Each bit votes as a wave of the rows' spacing has it (20.10's Hough transform, at the place where rows are known to
+    be). How they go on far ahead is known less well than they are wide: there they may lie where they are seen to.
 
     Args:
         x: (N,) of bits of vegetation ahead of the robot, m.
@@ -162,16 +179,51 @@ def row_cover(
         area: (N,) of ground that each covers, m^2.
         spacing: between rows, m.
         half_width: ground to either side of the robot's row that counts, m.
-        near: where the ground in view begins, m.
-        far: where it ends, m.
+        within: where the ground in view begins and ends ahead, m.
+        covariance: (3, 3) of offset (m), yaw (rad) and curvature (1/m) of the rows.
 
     Returns:
         Distance ahead (m), cover (-1 to 1) and weight (0 to 1) of each stretch, (S,) each.
     """
+    near, far = within
     edges = np.arange(np.ceil(near / CELL_M), np.floor(far / CELL_M) + 0.5) * CELL_M
     middles = 0.5 * (edges[:-1] + edges[1:])
     inside = np.abs(aside) < half_width
-    votes = area[inside] * np.cos(2.0 * np.pi * aside[inside] / spacing)
-    summed, _ = np.histogram(x[inside], edges, weights=votes)
+    place, phase = x[inside], 2.0 * np.pi * aside[inside] / spacing
+    real, imaginary = (
+        np.histogram(place, edges, weights=area[inside] * wave(phase))[0] for wave in (np.cos, np.sin)
+    )
+    most = np.minimum(2.0 * np.pi * _SIGMAS * sideways(middles, covariance) / spacing, np.pi)
+    if len(middles):
+        about = np.ones(min(_ABOUT, len(middles)))
+        seen = np.arctan2(np.convolve(imaginary, about, "same"), np.convolve(real, about, "same"))
+        lies = np.clip(seen, -most, most)
+        real = real * np.cos(lies) + imaginary * np.sin(lies)
     weight = np.clip(1.5 - middles / far, _FARTHEST, 1.0)
-    return middles, summed / (2.0 * half_width * CELL_M), weight
+    return middles, real / (2.0 * half_width * CELL_M), weight
+
+
+def sideways(ahead: Array, covariance: Array) -> Array:
+    """Standard deviation (N,), m, of where rows lie so far ahead (N,), m, by the covariance of `row_cover`."""
+    lateral = np.stack([np.ones(len(ahead)), ahead, -0.5 * ahead**2], axis=1)
+    return np.asarray(np.sqrt(np.einsum("si,ij,sj->s", lateral, covariance, lateral)))
+
+
+def go_on_until(
+    x: Array, aside: Array, area: Array, spacing: float, half_width: float, within: tuple[float, float]
+) -> float:
+    """How far ahead rows go on without open ground between, m, wherever they lie; arguments as of `row_cover`."""
+    ahead, cover, _ = row_cover(x, aside, area, spacing, half_width, within, _ANYWHERE)
+    if not len(ahead):
+        return within[1]
+    cover = np.convolve(cover, _WEIGHTS, "same")
+    near = cover[ahead < ahead[0] + _NEAR_M]
+    stands = cover > _THIN * max(float(np.quantile(near, 0.85)), 1e-3)
+    if not stands.any():
+        return within[1]
+    since = np.arange(len(ahead)) - np.maximum.accumulate(np.where(stands, np.arange(len(ahead)), -1))
+    since[: int(stands.argmax())] = 0
+    parted = since >= _PARTED
+    if not parted.any():
+        return within[1]
+    return float(ahead[int(parted.argmax()) - _PARTED] + 0.5 * CELL_M)

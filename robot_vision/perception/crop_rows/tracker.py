@@ -25,7 +25,7 @@ from robot_vision.perception.crop_rows.ground_fit import (
     pieces_of,
     tall_by_cover,
 )
-from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, row_cover
+from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, go_on_until, row_cover, sideways
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 from robot_vision.perception.crop_rows.sight import fault_of
 from robot_vision.perception.crop_rows.single_plant import contradicting_heading
@@ -48,6 +48,8 @@ _MOST_REFUSED = 8
 _LOST = 0.2
 #: Rows to either side of the robot's own that tell where rows end.
 _SIDE_ROWS = 2.5
+#: Rows beyond open ground are those before it only where these are known to such a standard deviation, in spacings.
+_TIED = 0.125
 #: Ground ahead whose plants are asked for the heading one by one, m, and factor on the variances where they dissent.
 _ASKED_M, _DISSENT = 5.0, 10.0
 
@@ -165,7 +167,7 @@ class RowTracker:
         rows, fault = self._fitted(picture, told, covered, camera)
         if rows is None:
             if self.row_filter.knows:
-                self._look_along(pieces, camera, self._start(), motion)
+                self._look_along(pieces, camera, self._start(), self._spread(), motion)
             return self._without(fault)
         expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
         rows = nearest_row(rows, expected)
@@ -173,12 +175,12 @@ class RowTracker:
         doubt = _DISSENT if dissent else 1.0
         if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3], doubt):
             if self.row_filter.knows:
-                self._look_along(pieces, camera, self._start(), motion)
+                self._look_along(pieces, camera, self._start(), self._spread(), motion)
             return self._without(dissent or "what stands in this picture does not go on from the rows before")
         rows = replace(rows, covariance=doubt * rows.covariance)
         self._refused = 0
         self._unseen = 0.0
-        self._look_along(pieces, camera, rows.values, motion)
+        self._look_along(pieces, camera, rows.values, rows.covariance[:3, :3], motion)
         return RowEstimate(self._lane(), dissent, True, rows, self._end())
 
     def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
@@ -201,6 +203,10 @@ class RowTracker:
     def _start(self) -> Array:
         """What a picture should show, (6,): as predicted, the body upright."""
         return np.array([*self.row_filter.expected(), 0.0, 0.0, -0.02])
+
+    def _spread(self) -> Array:
+        """Covariance (3, 3) of that."""
+        return np.asarray(self.row_filter.covariance[:3, :3])
 
     def _where_rows_stand(self, pieces: Pieces, camera: Camera) -> Pieces:
         """Leave out what grows in known gaps and where the rows are over: weeds, and the grass of the headland."""
@@ -238,6 +244,7 @@ class RowTracker:
             if pattern is None:
                 return None, "no rows stand out in this picture"
             start, bend = start_on_ground(pattern, camera, self.spacing), Curvature()
+        pieces = self._tied(pieces, camera, start)
         rows = self.fit.fit(pieces, camera, self.spacing, start, bend, tall_by_cover(covered))
         if rows is None:
             return None, "hardly anything grows before the robot"
@@ -253,7 +260,21 @@ class RowTracker:
             return None, "the rows lie as if the camera had been knocked over: look at camera.pitch and roll"
         return rows, ""
 
-    def _look_along(self, pieces: Pieces, camera: Camera, values: Array, motion: Motion) -> None:
+    def _tied(self, pieces: Pieces, camera: Camera, start: Array) -> Pieces:
+        """Leave out rows beyond open ground while it is not sure which of them goes on as which of those before it."""
+        x, y = ground_places(pieces.rays, camera, start)
+        aside, along = lateral(x, y, start)
+        near, far = ground_in_view(camera, start)
+        half, far = _SIDE_ROWS * self.spacing, min(far, 1.4 * self.fit.far)
+        until = go_on_until(along, aside, pieces.weight, self.spacing, half, (near, far))
+        here = along < until
+        if self.row_filter.knows:
+            here |= sideways(along, self._spread()) < _TIED * self.spacing
+        return Pieces(pieces.rays[here], pieces.weight[here], pieces.aside)
+
+    def _look_along(
+        self, pieces: Pieces, camera: Camera, values: Array, covariance: Array, motion: Motion
+    ) -> None:
         """Note where along the way rows stand."""
         if motion.speed is None:
             self.extent.reset()  # without odometry nobody knows where the last picture was taken
@@ -262,7 +283,7 @@ class RowTracker:
         near, far = ground_in_view(camera, values)
         half = _SIDE_ROWS * self.spacing
         stretch = row_cover(
-            along, aside, pieces.weight, self.spacing, half, near, min(far, 1.4 * self.fit.far)
+            along, aside, pieces.weight, self.spacing, half, (near, min(far, 1.4 * self.fit.far)), covariance
         )
         self.extent.see(self._way, *stretch)
 
