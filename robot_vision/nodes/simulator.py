@@ -91,6 +91,9 @@ class Simulator(VisionNode):
         Setting("delay", 0.03, "from a picture until its steering takes effect, s", 0.0, 1.0, live=False),
         Setting("seconds", 0.0, "end after so long, simulated s; 0: with the lane", 0.0, 1e6, live=False),
         Setting("end_with_lane", True, "end where the lane is over, too", live=False),
+        Setting(
+            "stand_limit", 0.0, "end after standing so long, simulated s; 0: never", 0.0, 1e6, live=False
+        ),
         Setting("start.offset", 0.0, "start so far left of the usual place, m", -100.0, 100.0, live=False),
         Setting("start.yaw", 0.0, "start turned by so much, rad, counter-clockwise", -3.2, 3.2, live=False),
         Setting("vehicle", "differential", "what is driven", None, None, VEHICLES, False),
@@ -129,6 +132,7 @@ class Simulator(VisionNode):
         self._known: dict[str, int] = {}
         self._settled = 0
         self._begun = self._ended = False
+        self._over = ""
         self._awaited_ns: int | None = None
         self._awaited_topics: set[str] = set()
         self._pictures = self._unanswered = 0
@@ -257,14 +261,24 @@ class Simulator(VisionNode):
             self._tell()
             self.get_logger().error(f"touched {self._drive.score.touched} after {self._drive.way:.2f} m")
         self._report()
-        seconds = self.settings["seconds"]
-        over = self.settings["end_with_lane"] and self._drive.at_the_end
-        if over or (seconds and self._drive.time_ns >= seconds * 1e9):
+        self._over = self._why_over()
+        if self._over:
             self._end()
             return
         self._show(readings)
         if self._lockstep:
             self._timer.reset()
+
+    def _why_over(self) -> str:
+        """What ends the drive here, in a word for the summary; empty while it goes on."""
+        drive, given = self._drive, self.settings
+        if given["end_with_lane"] and drive.at_the_end:
+            return "lane"
+        if given["seconds"] and drive.time_ns >= given["seconds"] * 1e9:
+            return "time"
+        if given["stand_limit"] and drive.stood_s >= given["stand_limit"]:
+            return "stands"
+        return ""
 
     def _show(self, readings: list[OdometryAt]) -> None:
         """Send one moment: the odometry up to it, the time, calibration and truth, and last the picture."""
@@ -341,7 +355,7 @@ class Simulator(VisionNode):
     def _state(self) -> dict[str, float | int | str | None]:
         """What is known of the drive so far, ready for JSON."""
         counts = {"pictures": self._pictures, "without_steering": self._unanswered}
-        return {**counts, **self._drive.summary()}
+        return {**counts, "ended": self._over, **self._drive.summary()}
 
     def _end(self) -> None:
         self._ended = True
