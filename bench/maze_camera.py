@@ -21,13 +21,15 @@ import numpy as np
 from bench.maze_drives import contest_maze
 from bench.report import Cell, Row, Table, at_least, at_most
 from robot_vision.control import PathPursuit
-from robot_vision.demo.maze_drive import DRIVE
+from robot_vision.demo.maze_drive import drive_settings
 from robot_vision.mapping import PlanViewMapper, Pose
 from robot_vision.perception import HeadingEstimator, LineDetector
 from robot_vision.planning import Exploration, Maze, MazeExplorer, MazeRunner
 from robot_vision.simulation.live import STANDING, LiveDrive, LiveSettings, OdometryAt
 from robot_vision.simulation.maze import grown, maze_world
 
+DRIVE = {name: value for name, value in drive_settings("maze_runner").items() if name != "timeout"}
+"""Of the pursuit: the timeout is the node's."""
 CELL_M = 1.0
 """At this size the camera sits 0.33 m over the floor, the walls are 0.28 m high."""
 RATE, STRIDE = 15, 3
