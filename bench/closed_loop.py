@@ -43,8 +43,15 @@ def run(quick: bool) -> list[Table]:
 
 def drive_at_box(seed: int) -> dict[str, Any]:
     """Let the nodes, the mapper among them, drive at a box that stands in the way; see `drive`."""
-    world = {"world": "corridor_blocked", "settings": [""]}
-    return drive(seed, mapped=True, rate=10, seconds=BLOCKED_S, stand_limit=0.0, **world)
+    return drive(
+        seed,
+        mapped=True,
+        rate=10,
+        world="corridor_blocked",
+        settings=[""],
+        seconds=BLOCKED_S,
+        stand_limit=0.0,
+    )
 
 
 def room_before_box(driven: dict[str, Any]) -> float:

@@ -17,6 +17,7 @@ from multiprocessing import get_context
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.maze_drives import contest_maze
 from bench.report import Cell, Row, Table, at_least, at_most
@@ -99,10 +100,10 @@ class Explorer:
             self.runner.move(at.time_ns * 1e-9, Pose(*at.reading[:3]))
             self._last = at
 
-    def look(self, picture: np.ndarray, now: float) -> None:
+    def look(self, picture: NDArray[np.uint8], now: float) -> None:
         """See a picture."""
         odometry = self._last.reading
-        lines = self._detector.detect(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+        lines = self._detector.detect(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8))
         points = self._estimator.update(lines, self._camera, now, odometry.turn_rate).vanishing_points
         seen = points.weight > 0.0
         self.runner.see_directions(now, points.directions[seen], points.sigma[seen], self._camera)
