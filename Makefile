@@ -68,7 +68,7 @@ test: $(STAMP) $(VENV)/.viewer
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy robot_vision
+	$(BIN)/mypy robot_vision bench
 
 bench: $(STAMP)
 	$(BIN)/python -m bench $(BENCH_ARGS)

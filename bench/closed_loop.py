@@ -21,6 +21,8 @@ WAY_M, WIDTH_M, ROBOT_M = 30.0, 2.0, 0.5
 SPEED = 1.0
 OFFSET_M, YAW, LEAN = 0.4, math.radians(10.0), math.radians(1.0)
 BLOCKED_S = 13.0
+STAND_S = 2.0
+"""A robot that has stood so long drives no more; each picture without steering costs the lockstep its time-out."""
 BOX_FRONT_M, START_M, ROBOT_FRONT_M = 10.0, 1.2, 0.3
 """Along the corridor: where the box begins and base_link starts; the robot reaches so far before that."""
 SIMULATOR = "simulator"
@@ -41,7 +43,15 @@ def run(quick: bool) -> list[Table]:
 
 def drive_at_box(seed: int) -> dict[str, Any]:
     """Let the nodes, the mapper among them, drive at a box that stands in the way; see `drive`."""
-    return drive(seed, mapped=True, rate=10, world="corridor_blocked", settings=[""], seconds=BLOCKED_S)
+    return drive(
+        seed,
+        mapped=True,
+        rate=10,
+        world="corridor_blocked",
+        settings=[""],
+        seconds=BLOCKED_S,
+        stand_limit=0.0,
+    )
 
 
 def room_before_box(driven: dict[str, Any]) -> float:
@@ -55,7 +65,9 @@ def drive(
     mapped: bool = False,
     **settings: Any,
 ) -> dict[str, Any]:
-    """Let the real nodes drive 30 m of corridor in lockstep, from 0.4 m and 10 degrees off.
+    """Let the real nodes drive 30 m of corridor in lockstep, from 0.4 m and 10 degrees off, to its end.
+
+    A robot that stands for good ends a drive, too.
 
     Args:
         seed: of the corridor, of noise and leaning.
@@ -64,8 +76,8 @@ def drive(
         settings: further parameters of the simulator.
 
     Returns:
-        What the simulator says at the end: way_m, contacts, closest_m, offset_rms_m, offset_worst_m,
-        pictures, without_steering, …
+        What the simulator says at the end: ended (lane, time or stands), way_m, contacts, closest_m, offset_rms_m,
+        offset_worst_m, pictures, without_steering, …
 
     Raises:
         ProcessError: a node failed.
@@ -88,6 +100,7 @@ def drive(
         "start.yaw": YAW,
         "lean": LEAN,
         "width": ROBOT_M,
+        "stand_limit": STAND_S,
         "wait_for_nodes": list(parameters),
         "wait_timeout": START_S,
         **settings,
@@ -126,9 +139,11 @@ def _table(drives: list[dict[str, Any]]) -> Table:
     def values(name: str) -> list[float]:
         return [math.nan if drive[name] is None else float(drive[name]) for drive in drives]
 
+    stood = float(sum(drive["ended"] == "stands" for drive in drives))
     rms, worst = 1e3 * np.array(values("offset_rms_m")), 1e3 * np.array(values("offset_worst_m"))
     rows = [
         Row("driven, shortest", "m", [Cell(min(values("way_m")), at_least(WAY_M))]),
+        Row("drives ended by standing", "", [Cell(stood, at_most(0.0))], 0),
         Row("walls touched, all drives", "", [Cell(sum(values("contacts")), at_most(0.0))], 0),
         Row("room to the walls, least", "m", [Cell(min(values("closest_m")))], 2),
         Row("offset after 5 m, RMS, worst drive", "mm", [Cell(float(rms.max()), at_most(30.0))]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -73,8 +74,8 @@ def by_lines(rounds: int) -> tuple[list[float], list[float]]:
     estimator = VanishingPointEstimator()
     estimator.warm_up()
     scenes = [right_angled(np.random.default_rng(count), camera, count) for count in COUNTS]
-    known = [_cost(lambda lines=lines: estimator.estimate(lines, camera), rounds) for lines in scenes]
-    withheld = [_cost(lambda lines=lines: estimator.estimate(lines, blind), rounds) for lines in scenes]
+    known = [_cost(partial(estimator.estimate, lines, camera), rounds) for lines in scenes]
+    withheld = [_cost(partial(estimator.estimate, lines, blind), rounds) for lines in scenes]
     return known, withheld
 
 
@@ -85,8 +86,8 @@ def by_pixels(rounds: int) -> tuple[list[float], list[float]]:
     limited, whole = LineDetector(), LineDetector(largest_area=100_000_000)
     limited.warm_up()
     return (
-        [_cost(lambda gray=gray: limited.detect(gray), rounds) for gray in tiled],
-        [_cost(lambda gray=gray: whole.detect(gray), rounds) for gray in tiled],
+        [_cost(partial(limited.detect, gray), rounds) for gray in tiled],
+        [_cost(partial(whole.detect, gray), rounds) for gray in tiled],
     )
 
 

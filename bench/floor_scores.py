@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +148,7 @@ def _fit(told: Array, true: Array) -> tuple[Array, Array]:
     return turn, true.mean(axis=0) - turn @ told.mean(axis=0)
 
 
-def _looked_up(values: NDArray, plan: floor_plan.Plan, places: Array, outside: float) -> NDArray:
+def _looked_up(values: NDArray[Any], plan: floor_plan.Plan, places: Array, outside: float) -> Array:
     """Values of a plan's cells (R, C) at places (..., 2)."""
     cells = np.floor((places - plan.origin) / plan.resolution).astype(int)
     inside = (cells >= 0).all(axis=-1) & (cells < np.array(values.shape)[::-1]).all(axis=-1)

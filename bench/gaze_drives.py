@@ -103,7 +103,7 @@ class _Eyes:
         self._before = 0.0
 
     def see(self, picture: NDArray[np.uint8], camera: Camera, now: float) -> tuple[WayEstimate, Gaze | None]:
-        lines = self._lines.detect(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+        lines = self._lines.detect(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8))
         speed, turn_rate = self.motion.mean(self._before, now)
         self._before = now
         return self._ways.update(lines, camera, now, speed, turn_rate), self._ways.look()

@@ -69,6 +69,7 @@ def _pixels(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
 def _plan(axes: Any, world: World, moment: Moment, look: NDArray[np.float64]) -> None:
     """The road from above, x ahead drawn upwards, and what each camera has in view."""
     state, lane = moment.state, getattr(world.lane, "road", world.lane)
+    assert lane is not None  # a road has one
     pose = lane.locate(state.x, state.y, state.yaw)
     cos, sin = np.cos(state.yaw), np.sin(state.yaw)
     half = 0.5 * pose.width

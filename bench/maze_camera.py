@@ -17,17 +17,20 @@ from multiprocessing import get_context
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.maze_drives import contest_maze
 from bench.report import Cell, Row, Table, at_least, at_most
 from robot_vision.control import PathPursuit
-from robot_vision.demo.maze_drive import DRIVE
+from robot_vision.demo.maze_drive import drive_settings
 from robot_vision.mapping import PlanViewMapper, Pose
 from robot_vision.perception import HeadingEstimator, LineDetector
 from robot_vision.planning import Exploration, Maze, MazeExplorer, MazeRunner
 from robot_vision.simulation.live import STANDING, LiveDrive, LiveSettings, OdometryAt
 from robot_vision.simulation.maze import grown, maze_world
 
+DRIVE = {name: value for name, value in drive_settings("maze_runner").items() if name != "timeout"}
+"""Of the pursuit: the timeout is the node's."""
 CELL_M = 1.0
 """At this size the camera sits 0.33 m over the floor, the walls are 0.28 m high."""
 RATE, STRIDE = 15, 3
@@ -97,10 +100,10 @@ class Explorer:
             self.runner.move(at.time_ns * 1e-9, Pose(*at.reading[:3]))
             self._last = at
 
-    def look(self, picture: np.ndarray, now: float) -> None:
+    def look(self, picture: NDArray[np.uint8], now: float) -> None:
         """See a picture."""
         odometry = self._last.reading
-        lines = self._detector.detect(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+        lines = self._detector.detect(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8))
         points = self._estimator.update(lines, self._camera, now, odometry.turn_rate).vanishing_points
         seen = points.weight > 0.0
         self.runner.see_directions(now, points.directions[seen], points.sigma[seen], self._camera)

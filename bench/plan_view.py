@@ -29,15 +29,16 @@ from robot_vision.simulation.sky import Clouds
 from robot_vision.simulation.world import World, standard_camera
 
 RATE = 15
-CRATES = {"crates": 4, "disguised": 4, "bins": 1}
+CRATES: dict[str, float] = {"crates": 4, "disguised": 4, "bins": 1}
+Asked = tuple[str, dict[str, float], int]
 #: World, parameters and seed; none of these seeds was looked at while settings were chosen.
-CORRIDORS = (
+CORRIDORS: tuple[Asked, ...] = (
     ("corridor", {}, 101),
     ("corridor", CRATES, 102),
     ("corridor", CRATES, 103),
     ("corridor_blocked", {}, 104),
 )
-PATHS = (("path", {}, 105), ("path", {}, 106))
+PATHS: tuple[Asked, ...] = (("path", {}, 105), ("path", {}, 106))
 SECONDS, QUICK_S = 6.0, 2.0
 _TRUTH_EVERY = 3
 LONG_DRIVE = 10_000
@@ -174,7 +175,7 @@ def _table(kinds: list[Drives]) -> Table:
         row("distance of seen objects, error, p95", distance(0.95), both(at_most(8))),
         row(
             "clearance within 5 % or 0.1 m, from 5 m on",
-            [float(np.mean(kind.clearance or [np.nan])) for kind in kinds],
+            [float(np.mean(kind.clearance)) if kind.clearance else np.nan for kind in kinds],
             both(at_least(100)),
         ),
     ]

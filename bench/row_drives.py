@@ -78,7 +78,7 @@ class Told:
     def kept(self) -> NDArray[np.float64]:
         """True offsets after settling, m."""
         along = np.array(self.along)
-        return np.array(self.offset)[along > along[0] + SETTLING_M]
+        return np.asarray(np.array(self.offset)[along > along[0] + SETTLING_M])
 
 
 def recorded(settings: dict[str, Any], seed: int, seconds: float) -> Told:

@@ -7,6 +7,8 @@ ros2 launch robot_vision maze_camera.launch.py file:=contest.maze rows:=16 colum
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, RegisterEventHandler
 from launch.conditions import IfCondition
@@ -15,6 +17,7 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+from ruamel.yaml import YAML
 
 ARGUMENTS = (
     ("file", "", "drawing of the maze, for the simulator alone; empty: grown from the seed"),
@@ -30,9 +33,9 @@ ARGUMENTS = (
 )
 HEIGHT, PITCH, AHEAD, WIDTH = 1 / 3, 0.2618, 1 / 9, 0.45
 """Of the simulated camera and robot, in cells and rad."""
-IN_CELLS = {"speed": 0.9, "lookahead": 0.33, "most_acceleration": 1.8}
-TURNS = {"most_turn_rate": 2.0, "most_turn_acceleration": 6.0, "turn_on_spot": 0.5, "latency": 0.18}
-"""Parameters of the runner, the first for cells of 1 m."""
+SETTINGS = YAML(typ="safe").load(Path(__file__).resolve().parents[1] / "config" / "maze_camera.yaml")
+IN_CELLS = ("speed", "lookahead", "most_acceleration")
+"""Parameters of the runner that are told for cells of 1 m."""
 PATIENCE_S = 60.0
 
 
@@ -57,15 +60,17 @@ def generate_launch_description() -> LaunchDescription:
         return ParameterValue(given[name], value_type=int)
 
     place = {"camera.height": scaled(HEIGHT), "camera.pitch": PITCH, "camera.x": scaled(AHEAD)}
+    mapping, driving = (
+        SETTINGS[f"/**/{name}"]["ros__parameters"] for name in ("plan_view_mapper", "maze_runner")
+    )
     runner = {
         **place,
-        **TURNS,
-        **{name: scaled(value) for name, value in IN_CELLS.items()},
+        **driving,
+        **{name: scaled(driving[name]) for name in IN_CELLS},
         "rows": whole("rows"),
         "columns": whole("columns"),
         "goals": ParameterValue(given["goals"], value_type=list[str]),
         "cell": ParameterValue(given["cell"], value_type=float),
-        "timeout": 2.0,
     }
     simulator = node(
         "simulator",
@@ -109,7 +114,7 @@ def generate_launch_description() -> LaunchDescription:
             node("bag_recorder", {"output": given["record"]}, condition=IfCondition(recorded)),
             node("line_detector"),
             node("vp_estimator", place),
-            node("plan_view_mapper", place, {"robot.width": scaled(WIDTH), "kerbs": False}),
+            node("plan_view_mapper", place, mapping, {"robot.width": scaled(WIDTH)}),
             node("maze_runner", runner),
             simulator,
             RegisterEventHandler(end),

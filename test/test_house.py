@@ -33,6 +33,7 @@ ROOMS = (
 )
 FRONT_DOOR = {
     "calibrate": "cli",
+    "commands": "cli",
     "demo": "cli",
     "doctor": "cli",
     "places": "cli",

@@ -6,23 +6,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from robot_vision.bags.messages import stamp_ns, yaw_of
 from robot_vision.demo.show import NODES, present
-from robot_vision.ros.processes import Graph, NodeProcess, ProcessError
+from robot_vision.demo.watching import TOUCHED, Watcher, watch
+from robot_vision.ros.processes import Graph
 from robot_vision.ros.replays import START_S
-from robot_vision.simulation.record import START_NS, build_world
+from robot_vision.simulation.record import build_world
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 START_OFFSET_M, START_YAW = 0.3, math.radians(8.0)
 LEAN = math.radians(0.5)
-TOUCHED = 3
-"""Exit code of a simulator whose vehicle has touched something."""
-_WAIT_S = 0.1
-_TELL_EVERY_NS = 1_000_000_000
 
 
 def run_live(world: str, out: Path, seconds: float, seed: int, console: Console) -> None:
@@ -67,27 +64,17 @@ def run_live(world: str, out: Path, seconds: float, seed: int, console: Console)
             },
         )
         domain = int(graph.environment["ROS_DOMAIN_ID"])
-        watch(_Status(), simulator, [recorder, *nodes], domain, console)
+        watch(_LaneWatcher(), simulator, [recorder, *nodes], domain, console)
     if simulator.returncode == TOUCHED:
         console.print("[red]the robot has touched something[/]")
     present(bag, bag, out, console)
 
 
-class Watcher(Protocol):
-    """What is told of a drive, as one line (`str`), and when it is over."""
-
-    stamp_ns: int
-    over: bool
-
-    def topics(self) -> list[tuple[type, str, Callable[[Any], None]]]:
-        """Type, name and who hears it of each topic."""
-
-
-class _Status:
-    """The newest heading, its truth and the steering, as one line."""
+class _LaneWatcher(Watcher):
+    """The newest heading, its truth and the steering."""
 
     def __init__(self) -> None:
-        self.stamp_ns, self.over = START_NS, False
+        super().__init__()
         self._heading = self._truth = self._steering = "none yet"
         self._truths: dict[int, str] = {}
 
@@ -118,74 +105,11 @@ class _Status:
         turn = math.degrees(message.twist.angular.z)
         self._steering = f"{message.twist.linear.x:.2f} m/s {turn:+5.1f} °/s"
 
-    def __str__(self) -> str:
-        seconds = (self.stamp_ns - START_NS) / 1e9
-        return f"{seconds:5.1f} s  heading, offset: {self._heading}  (truth {self._truth})  steering {self._steering}"
+    def told(self) -> str:
+        """See `Watcher`."""
+        return f"heading, offset: {self._heading}  (truth {self._truth})  steering {self._steering}"
 
 
 def _lane_text(message: Any) -> str:
     pose = message.pose.pose
     return f"{math.degrees(yaw_of(pose.orientation)):+6.2f}° {100 * pose.position.y:+6.1f} cm"
-
-
-def watch(
-    status: Watcher, simulator: NodeProcess, others: list[NodeProcess], domain: int, console: Console
-) -> None:
-    """Show one line that changes, or on a console that is none a line a second, until the drive ends.
-
-    Args:
-        status: hears what is told.
-        simulator: the drive ends with it, or when the status says so: then it is stopped.
-        others: nodes that must not end before.
-        domain: of the graph.
-        console: where it is told.
-
-    Raises:
-        ProcessError: a node ended before the drive did, or the simulator failed.
-    """
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.signals import SignalHandlerOptions
-
-    from robot_vision.ros.qos import NEWEST
-    from robot_vision.ros.run import use_transport_profile
-
-    use_transport_profile()
-    context = Context()
-    rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("watcher", context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    for kind, topic, callback in status.topics():
-        node.create_subscription(kind, topic, callback, NEWEST)
-    told_ns = START_NS
-    try:
-        with console.status("starting; the first time kernels are compiled") as line:
-            while simulator.running and not status.over:
-                executor.spin_once(timeout_sec=_WAIT_S)
-                if status.stamp_ns > START_NS:
-                    line.update(str(status))
-                if status.stamp_ns - told_ns >= _TELL_EVERY_NS and not console.is_terminal:
-                    told_ns = status.stamp_ns
-                    console.print(str(status))
-                _look_after(others)
-    finally:
-        executor.remove_node(node)
-        node.destroy_node()
-        executor.shutdown()
-        context.try_shutdown()
-    code = simulator.stop() if status.over else simulator.wait(_WAIT_S)
-    if code not in (0, TOUCHED):
-        raise ProcessError(
-            "\n".join(["the drive failed; the log of simulator ends with:", *simulator.log[-20:]])
-        )
-    console.print(str(status))
-
-
-def _look_after(nodes: list[NodeProcess]) -> None:
-    for node in nodes:
-        if not node.running:
-            raise ProcessError(
-                "\n".join([f"{node.node} ended before the drive; its log ends with:", *node.log[-20:]])
-            )

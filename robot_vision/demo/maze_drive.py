@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from robot_vision.bags.messages import stamp_ns
 from robot_vision.demo.drawing import DrawingError
-from robot_vision.demo.live_drive import TOUCHED, watch
+from robot_vision.demo.watching import TOUCHED, Watcher, watch
+from robot_vision.places import shared_file
 from robot_vision.ros.processes import Graph, NodeProcess
 from robot_vision.ros.replays import START_S
 from robot_vision.simulation.maze import MazeSettings, maze
-from robot_vision.simulation.record import START_NS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,16 +26,6 @@ if TYPE_CHECKING:
 NODES = ("line_detector", "vp_estimator", "plan_view_mapper", "maze_runner")
 SIDE = 4
 """Rows and columns of the maze."""
-DRIVE = {
-    "speed": 0.9,
-    "lookahead": 0.33,
-    "most_acceleration": 1.8,
-    "most_turn_rate": 2.0,
-    "most_turn_acceleration": 6.0,
-    "turn_on_spot": 0.5,
-    "latency": 0.18,
-}
-"""Of the runner, for cells of 1 m and six pictures a second."""
 RATE = 6
 ANSWER_S = 10.0
 """How long the simulator waits for the steering to one picture."""
@@ -48,6 +38,18 @@ _PAPER, _UNKNOWN, _WALL = (255, 255, 255), (225, 225, 225), (40, 40, 40)
 _TRUE, _BELIEVED = (200, 130, 40), (30, 30, 220)
 
 
+def drive_settings(node: str) -> dict[str, Any]:
+    """Parameters with which a node explores a maze of cells of 1 m by one camera, from config/maze_camera.yaml.
+
+    Raises:
+        PlaceError: the file is missing.
+    """
+    from ruamel.yaml import YAML
+
+    told = YAML(typ="safe").load(shared_file("config/maze_camera.yaml"))
+    return dict(told[f"/**/{node}"]["ros__parameters"])
+
+
 def run_maze(out: Path, seconds: float, seed: int, console: Console) -> None:
     """Let the real nodes explore and run a maze, and leave demo.png and demo.mcap in a folder.
 
@@ -58,6 +60,7 @@ def run_maze(out: Path, seconds: float, seed: int, console: Console) -> None:
         console: where the drive is told.
 
     Raises:
+        PlaceError: the settings of the drive are missing.
         ProcessError: a node ended before the drive did.
         DrawingError: the picture cannot be written.
     """
@@ -71,14 +74,17 @@ def run_maze(out: Path, seconds: float, seed: int, console: Console) -> None:
     settings: dict[str, dict[str, Any]] = {
         "line_detector": {},
         "vp_estimator": place,
-        "plan_view_mapper": {**place, "robot.width": world.robot_width, "kerbs": False},
+        "plan_view_mapper": {
+            **place,
+            **drive_settings("plan_view_mapper"),
+            "robot.width": world.robot_width,
+        },
         "maze_runner": {
             **place,
-            **DRIVE,
+            **drive_settings("maze_runner"),
             "rows": SIDE,
             "columns": SIDE,
             "heading": facing,
-            "timeout": 2.0,
         },
     }
     out.mkdir(parents=True, exist_ok=True)
@@ -108,7 +114,7 @@ def run_maze(out: Path, seconds: float, seed: int, console: Console) -> None:
                 "wait_timeout": START_S,
             },
         )
-        status = _Status(nodes[-1])
+        status = _MazeWatcher(nodes[-1])
         domain = int(graph.environment["ROS_DOMAIN_ID"])
         watch(status, simulator, [recorder, *nodes], domain, console)
     if simulator.returncode == TOUCHED:
@@ -122,11 +128,11 @@ def run_maze(out: Path, seconds: float, seed: int, console: Console) -> None:
         console.print(f"{path}  {path.stat().st_size / 1e6:.1f} MB")
 
 
-class _Status:
+class _MazeWatcher(Watcher):
     """What the runner is about, where it believes to be and where it is; and its picture."""
 
     def __init__(self, runner: NodeProcess) -> None:
-        self.stamp_ns, self.over = START_NS, False
+        super().__init__()
         self._runner = runner
         self._maze: Any = None
         self._truth: dict[int, tuple[float, float]] = {}
@@ -150,11 +156,11 @@ class _Status:
             (PoseWithCovarianceStamped, "pose", self._hear_pose),
         ]
 
-    def __str__(self) -> str:
-        told = next((line for line in reversed(self._runner.log) if _TOLD in line), "; looks for the goal")
-        about = told.split("]: ")[-1].lstrip("; ")
-        seconds = (self.stamp_ns - START_NS) / 1e9
-        return f"{seconds:5.1f} s  place {100 * self._worst:.1f} cm wrong at most  {about}"
+    def told(self) -> str:
+        """See `Watcher`."""
+        line = next((line for line in reversed(self._runner.log) if _TOLD in line), "; looks for the goal")
+        about = line.split("]: ")[-1].lstrip("; ")
+        return f"place {100 * self._worst:.1f} cm wrong at most  {about}"
 
     def drawn(self) -> NDArray[np.uint8]:
         """The picture that showed most floor, and the maze as it is known, with the way driven and believed."""

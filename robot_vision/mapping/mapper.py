@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera, GroundPlane
-from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping.appearance import FloorAppearance
 from robot_vision.mapping.boundary import Boundary, BoundaryFinder
 from robot_vision.mapping.clearance import Clearance
 from robot_vision.mapping.evidence import Evidence, sharp
 from robot_vision.mapping.feature_points import FeatureAnnotator, GroundPoints
 from robot_vision.mapping.floor_sample import FloorSample
+from robot_vision.mapping.freeze import FreezeDetector
 from robot_vision.mapping.ground_lines import Borders, GroundLines, LineKind
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.horizon import Horizon, HorizonFilter
@@ -125,7 +125,9 @@ class PlanViewMapper:
     clearance: Clearance = field(default_factory=Clearance)
     features: FeatureAnnotator = field(default_factory=FeatureAnnotator)
     map: OccupancyMap = field(default_factory=OccupancyMap)
-    _first_seen: tuple[Picture, Pose] | None = field(default=None, init=False, repr=False)
+    _freeze: FreezeDetector = field(
+        default_factory=lambda: FreezeDetector(_MOVED_M, _TURNED), init=False, repr=False
+    )
     _slips: deque[float] = field(default_factory=lambda: deque(maxlen=15), init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -136,10 +138,9 @@ class PlanViewMapper:
 
     def reset(self) -> None:
         """Forget everything earlier pictures told, the map too."""
-        stages = (self.horizon, self.sample, self.appearance, self.motion, self.shadows, self.kerbs, self.map)
-        for stage in stages:
+        seen = (self.horizon, self.sample, self.appearance, self.motion, self.shadows, self.kerbs, self.map)
+        for stage in (*seen, self._freeze):
             stage.reset()
-        self._first_seen = None
         self._slips.clear()
 
     def warm_up(self) -> None:
@@ -187,7 +188,7 @@ class PlanViewMapper:
         unreadable = _unreadable(gray)
         if unreadable:
             return self._nothing(horizon, unreadable)
-        if self._is_frozen(gray, pose):
+        if pose is not None and self._freeze.update(gray, pose):
             return self._nothing(
                 horizon, "the picture stays the same while the robot moves: does the camera hang?"
             )
@@ -260,16 +261,6 @@ class PlanViewMapper:
             reason=reason,
             layers=Layers(view, gray, score, shadow, parallax, kinds, straight),
         )
-
-    def _is_frozen(self, gray: Picture, pose: Pose | None) -> bool:
-        """Whether this is the very picture that was first seen from another place."""
-        if pose is None:
-            return False
-        if self._first_seen is None or not np.array_equal(self._first_seen[0], gray):
-            self._first_seen = gray, pose
-        before = self._first_seen[1]
-        way = np.hypot(pose.x - before.x, pose.y - before.y)
-        return bool(way >= _MOVED_M or abs(wrap_angle(pose.yaw - before.yaw)) >= _TURNED)
 
     def _kerbs(
         self,

@@ -42,6 +42,11 @@ class Pose(NamedTuple):
             float(wrap_angle(self.yaw + pose.yaw)),
         )
 
+    def is_apart(self, other: Pose, way: float, turn: float) -> bool:
+        """Whether another pose is at least so far away (m), or turned by at least so much (rad)."""
+        apart = math.hypot(self.x - other.x, self.y - other.y)
+        return apart >= way or bool(abs(wrap_angle(self.yaw - other.yaw)) >= turn)
+
     def to_here(self, later: Pose) -> NDArray[np.float64]:
         """(3, 3) from ground points of a later base_link to those of this one."""
         return np.asarray(np.linalg.solve(self.matrix, later.matrix))

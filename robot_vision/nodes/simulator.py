@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import json
 import time
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, TwistStamped
@@ -34,20 +34,15 @@ from robot_vision.ros.diagnostics import TOPIC as DIAGNOSTICS
 from robot_vision.ros.diagnostics import Level
 from robot_vision.ros.head import point_from_message
 from robot_vision.ros.node import VisionNode
-from robot_vision.ros.parameters import ParameterError, Setting
 from robot_vision.ros.qos import ANSWER, EVERY, NEWEST
 from robot_vision.ros.readiness import AwaitedNodes
 from robot_vision.ros.run import run_node
+from robot_vision.ros.simulator_settings import SIMULATOR_SETTINGS, drive_asked_for
 from robot_vision.simulation import sensed
-from robot_vision.simulation.asked import split_settings
-from robot_vision.simulation.drive import VEHICLES
-from robot_vision.simulation.errors import SimulationError
-from robot_vision.simulation.head import HeadSettings
-from robot_vision.simulation.live import STANDING, LiveDrive, LiveSettings, OdometryAt
-from robot_vision.simulation.record import START_NS, build_world
+from robot_vision.simulation.live import STANDING, OdometryAt
+from robot_vision.simulation.record import START_NS
 from robot_vision.simulation.sensed import PictureFormat
 from robot_vision.simulation.truth import Said, TruthTeller
-from robot_vision.simulation.vehicle import VehicleSettings
 
 # as in bag_player: a history of one makes Fast DDS ask for a receipt at once
 LOCKSTEP_DEPTH, DEPTH = 1, 20
@@ -68,52 +63,12 @@ class Simulator(VisionNode):
         ParameterError: the parameters ask for what cannot be.
     """
 
-    SETTINGS: ClassVar = (
-        Setting("world", "corridor", "which world: corridor, path, road, field, maze, …", live=False),
-        Setting("seed", 0, "of the world, of noise and leaning", 0, 2**31 - 1, live=False),
-        Setting("settings", [""], "settings of the world, each as name=value", live=False),
-        Setting("rate", 15, "pictures a second of simulated time; divides 600", 1, 60, live=False),
-        Setting(
-            "transport",
-            "raw",
-            "how pictures go out: raw or compressed",
-            None,
-            None,
-            ("raw", "compressed"),
-            False,
-        ),
-        Setting("quality", 90, "of compressed pictures", 1, 100, live=False),
-        Setting("lockstep", False, "wait for the steering to each picture", live=False),
-        Setting("lockstep_timeout", 2.0, "how long it is waited for, s", 0.001, 1e6, live=False),
-        Setting(
-            "timeout", 0.5, "a steering older than this is not obeyed, simulated s", 0.01, 60.0, live=False
-        ),
-        Setting("delay", 0.03, "from a picture until its steering takes effect, s", 0.0, 1.0, live=False),
-        Setting("seconds", 0.0, "end after so long, simulated s; 0: with the lane", 0.0, 1e6, live=False),
-        Setting("end_with_lane", True, "end where the lane is over, too", live=False),
-        Setting("start.offset", 0.0, "start so far left of the usual place, m", -100.0, 100.0, live=False),
-        Setting("start.yaw", 0.0, "start turned by so much, rad, counter-clockwise", -3.2, 3.2, live=False),
-        Setting("vehicle", "differential", "what is driven", None, None, VEHICLES, False),
-        Setting("width", 0.0, "of the robot, m; 0: as the world has it", 0.0, 10.0, live=False),
-        Setting("length", 0.0, "of the robot, m; 0: as the world has it", 0.0, 10.0, live=False),
-        Setting(
-            "lean", 0.0, "greatest roll and pitch of the body while it drives, rad", 0.0, 0.5, live=False
-        ),
-        Setting("roughness", 0.0, "standard deviation of the ground's height, m", 0.0, 0.2, live=False),
-        Setting("noise", 1.0, "factor on the noise of camera and wheels; 0: none", 0.0, 20.0, live=False),
-        Setting("head.on", False, "whether look_at turns the camera, on a pan-tilt head", live=False),
-        Setting("head.most_pan", 1.2, "of that head to either side, rad", 0.01, 3.1, live=False),
-        Setting("head.rate", 2.0, "greatest of its joints, rad/s", 0.01, 100.0, live=False),
-        Setting("head.lag", 0.08, "time constant of its servos, s", 0.0, 5.0, live=False),
-        Setting("settling", 5.0, "way that does not count for the offset's RMS, m", 0.0, 1e6, live=False),
-        Setting("wait_for_nodes", [""], "nodes whose diagnostics must say that they are ready", live=False),
-        Setting("wait_timeout", 10.0, "how long to wait for those who listen, s", 0.0, 1e6, live=False),
-    )
+    SETTINGS: ClassVar = SIMULATOR_SETTINGS
 
     def __init__(self) -> None:
         super().__init__("simulator")
         given = self.settings
-        self._drive = _made_drive(given)
+        self._drive = drive_asked_for(given)
         world = self._drive.world
         self._teller = TruthTeller(world, world.camera)
         self._lockstep: bool = given["lockstep"]
@@ -129,6 +84,7 @@ class Simulator(VisionNode):
         self._known: dict[str, int] = {}
         self._settled = 0
         self._begun = self._ended = False
+        self._over = ""
         self._awaited_ns: int | None = None
         self._awaited_topics: set[str] = set()
         self._pictures = self._unanswered = 0
@@ -257,14 +213,24 @@ class Simulator(VisionNode):
             self._tell()
             self.get_logger().error(f"touched {self._drive.score.touched} after {self._drive.way:.2f} m")
         self._report()
-        seconds = self.settings["seconds"]
-        over = self.settings["end_with_lane"] and self._drive.at_the_end
-        if over or (seconds and self._drive.time_ns >= seconds * 1e9):
+        self._over = self._why_over()
+        if self._over:
             self._end()
             return
         self._show(readings)
         if self._lockstep:
             self._timer.reset()
+
+    def _why_over(self) -> str:
+        """What ends the drive here, in a word for the summary; empty while it goes on."""
+        drive, given = self._drive, self.settings
+        if given["end_with_lane"] and drive.at_the_end:
+            return "lane"
+        if given["seconds"] and drive.time_ns >= given["seconds"] * 1e9:
+            return "time"
+        if given["stand_limit"] and drive.stood_s >= given["stand_limit"]:
+            return "stands"
+        return ""
 
     def _show(self, readings: list[OdometryAt]) -> None:
         """Send one moment: the odometry up to it, the time, calibration and truth, and last the picture."""
@@ -341,7 +307,7 @@ class Simulator(VisionNode):
     def _state(self) -> dict[str, float | int | str | None]:
         """What is known of the drive so far, ready for JSON."""
         counts = {"pictures": self._pictures, "without_steering": self._unanswered}
-        return {**counts, **self._drive.summary()}
+        return {**counts, "ended": self._over, **self._drive.summary()}
 
     def _end(self) -> None:
         self._ended = True
@@ -355,35 +321,6 @@ class Simulator(VisionNode):
     def _summarise(self) -> None:
         # scripts read this line
         self.get_logger().info(f"{SUMMARY}{json.dumps(self._state())}")
-
-
-def _made_drive(given: dict[str, Any]) -> LiveDrive:
-    try:
-        world = build_world(given["world"], given["seed"], split_settings(given["settings"]))
-        return LiveDrive(world, _live_settings(given, world.drive.speed), given["seed"])
-    except SimulationError as refusal:
-        raise ParameterError(str(refusal)) from refusal
-
-
-def _live_settings(given: dict[str, Any], usual_speed: float) -> LiveSettings:
-    able = VehicleSettings(kind=given["vehicle"], most_speed=max(3.0, 1.5 * usual_speed))
-    return LiveSettings(
-        rate=given["rate"],
-        vehicle=able,
-        offset=given["start.offset"],
-        yaw=given["start.yaw"],
-        lean=given["lean"],
-        roughness=given["roughness"],
-        noise=given["noise"],
-        delay=given["delay"],
-        timeout=given["timeout"],
-        settling=given["settling"],
-        width=given["width"] or None,
-        length=given["length"] or None,
-        head=HeadSettings(given["head.most_pan"], rate=given["head.rate"], lag=given["head.lag"])
-        if given["head.on"]
-        else None,
-    )
 
 
 def main(args: list[str] | None = None) -> None:

@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 _WALLS = 30.0
 #: How long walls must have been gone, or there, before the kind of way changes, s.
 _SURE = 1.0
+#: A lane as wide as the one between walls, give or take this share, is that one.
+_SAME_WIDTH = 0.1
 #: A road that was followed is waited for so long before vanishing points are asked instead, s.
 _ROAD_COMES_BACK = 2.0
 _PATH_STEP = 0.5
@@ -102,6 +104,7 @@ class WayEstimator:
     attention: Attention | None = None
     _newest: _Newest | None = field(default=None, init=False, repr=False, compare=False)
     _walled: bool | None = field(default=None, init=False, repr=False, compare=False)
+    _between_walls: float | None = field(default=None, init=False, repr=False, compare=False)
     _contrary_since: float | None = field(default=None, init=False, repr=False, compare=False)
     _road_seen: float | None = field(default=None, init=False, repr=False, compare=False)
 
@@ -128,7 +131,7 @@ class WayEstimator:
             self.attention.reset()
         self.gaze.reset()
         self._newest = None
-        self._walled = self._contrary_since = self._road_seen = None
+        self._walled = self._between_walls = self._contrary_since = self._road_seen = None
 
     def update(
         self,
@@ -202,7 +205,12 @@ class WayEstimator:
         if self.kind is not Kind.AUTO:
             return self.kind is Kind.ROAD
         vertical = seen.vanishing_points.of(Role.VERTICAL)
-        walls = vertical is not None and seen.vanishing_points.weight[vertical] >= _WALLS
+        walls = vertical is not None and bool(seen.vanishing_points.weight[vertical] >= _WALLS)
+        width = seen.lane.width if seen.lane is not None and seen.lane.offset_known else None
+        if walls:
+            self._between_walls = width or self._between_walls
+        elif self._walled:
+            walls = self._is_between_them_still(width)
         if self._walled is None:
             self._walled = walls
         elif partly and not walls:
@@ -216,6 +224,14 @@ class WayEstimator:
             self._walled, self._contrary_since = walls, None
             self.road.reset()
         return not self._walled
+
+    def _is_between_them_still(self, width: float | None) -> bool:
+        """Whether a lane (width in m, None: no lane) is that between the walls which were seen last.
+
+        Before the end of a corridor few uprights are left in the picture, but the feet of its walls go on.
+        """
+        before = self._between_walls
+        return width is not None and before is not None and abs(width - before) <= _SAME_WIDTH * before
 
     def _in_corridor(self, seen: HeadingEstimate) -> WayEstimate:
         lane = seen.lane

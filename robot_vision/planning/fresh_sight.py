@@ -5,11 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-from robot_vision.geometry.rotation import wrap_angle
 from robot_vision.mapping import PlanView, Pose
+from robot_vision.mapping.freeze import FreezeDetector
 from robot_vision.planning.grid import checked_positive
 
 _WAY, _TURN = 0.03, 0.05
@@ -30,12 +27,12 @@ class FreshSight:
     """
 
     cell: float
-    _cells: NDArray[np.int8] | None = field(default=None, init=False, repr=False)
-    _first_seen: Pose | None = field(default=None, init=False, repr=False)
+    _freeze: FreezeDetector = field(init=False, repr=False)
     _viewed: Pose | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         checked_positive(self.cell, "cell")
+        self._freeze = FreezeDetector(_WAY * self.cell, _TURN)
 
     def fault(self, plan: PlanView, odometry: Pose) -> str:
         """Why a plan is none to drive by; empty when it is one. No two pictures taken on the way give the same plan.
@@ -46,20 +43,13 @@ class FreshSight:
         """
         if (plan.cells < 0).all():
             return "the plan of the floor shows nothing"
-        if self._cells is None or self._first_seen is None or not np.array_equal(self._cells, plan.cells):
-            self._cells, self._first_seen = plan.cells, odometry
-        elif self._is_elsewhere(odometry, self._first_seen):
+        if self._freeze.update(plan.cells, odometry):
             return "the plan of the floor stays the same while the robot moves"
         return ""
 
     def trust(self, pose: Pose) -> float:
         """Share of its usual weight that a plan from this pose has: errors of pictures from one place are the same."""
-        if self._viewed is not None and not self._is_elsewhere(pose, self._viewed):
+        if self._viewed is not None and not pose.is_apart(self._viewed, self._freeze.way, self._freeze.turn):
             return _SAME_VIEW
         self._viewed = pose
         return 1.0
-
-    def _is_elsewhere(self, pose: Pose, before: Pose) -> bool:
-        """Whether a picture from here tells something that one from there did not."""
-        way = np.hypot(pose.x - before.x, pose.y - before.y)
-        return bool(way >= _WAY * self.cell or abs(wrap_angle(pose.yaw - before.yaw)) >= _TURN)

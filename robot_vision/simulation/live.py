@@ -30,6 +30,8 @@ END_SHARE = 0.15
 """Of the lane's length: a lane through a small maze is over so near to its end, if that is nearer than END_GAP."""
 _LOOK_STEPS = 10
 """Contact is looked for 60 times a second: every 17 mm at 1 m/s."""
+_STILL = 0.01
+"""Slower than this, m/s and rad/s, the robot stands."""
 _PARTED_M = 0.02
 """A contact is over when there is so much room again."""
 _ODOMETRY_STEPS = STEPS_PER_SECOND // ODOMETRY_RATE
@@ -141,7 +143,7 @@ class LiveDrive:
         self._clouds = Clouds(world.clouds, seed)
         self._odometer = Odometer(_wheels(how.noise, seed))
         self._commands: deque[_Command] = deque()
-        self._step = 0
+        self._step = self._moved = 0
         self._rolled = self._turned = 0.0
         self._in_contact = False
         self._free = self._vehicle.x, self._vehicle.y, self._vehicle.yaw
@@ -182,6 +184,11 @@ class LiveDrive:
     def in_contact(self) -> bool:
         """Whether the robot leans on something."""
         return self._in_contact
+
+    @property
+    def stood_s(self) -> float:
+        """How long the robot has stood by now, simulated seconds."""
+        return (self._step - self._moved) / STEPS_PER_SECOND
 
     @property
     def lane_pose(self) -> LanePose | None:
@@ -271,6 +278,8 @@ class LiveDrive:
         if self.head is not None:
             self.head.step(1 / STEPS_PER_SECOND)
         self._step += 1
+        if max(abs(vehicle.speed), abs(vehicle.turn_rate)) > _STILL:
+            self._moved = self._step
         self._rolled += vehicle.speed / STEPS_PER_SECOND
         self._turned += vehicle.turn_rate / STEPS_PER_SECOND
         if self._step % _LOOK_STEPS == 0 or self._in_contact:

@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
+from robot_vision.demo.maze_drive import drive_settings
 from robot_vision.planning import Maze, MazeExplorer
 from robot_vision.ros.processes import Graph
 from robot_vision.ros.replays import START_S
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
-from bench.maze_camera import DRIVE  # noqa: E402  (the benchmarks are not installed)
 
 RUNNER, SIMULATOR = "maze_runner", "simulator"
 SUMMARY = "summary: "
@@ -33,9 +29,15 @@ def test_the_graph_explores_a_maze_by_its_camera_and_runs_the_shortest_way(tmp_p
     file = tmp_path / "corner.maze"
     maze.write(file)
     place = {"camera.height": 1 / 3, "camera.pitch": 0.2618, "camera.x": 1 / 9}
-    mapper = {**place, "robot.width": 0.45, "kerbs": False}
+    mapper = {**place, **drive_settings("plan_view_mapper"), "robot.width": 0.45}
     goal = ",".join(str(part) for part in maze.goals[0])
-    runner_settings = {**place, **DRIVE, "rows": 2, "columns": 2, "goals": [goal], "timeout": 2.0}
+    runner_settings = {
+        **place,
+        **drive_settings(RUNNER),
+        "rows": 2,
+        "columns": 2,
+        "goals": [goal],
+    }
     with Graph() as graph:
         nodes = [
             graph.start(node, {"use_sim_time": True, **settings})

@@ -96,6 +96,7 @@ def driven(graph: Graph, count: int) -> tuple[list[bytes], list[bytes], list[byt
             drive.steer(stamp, 0.6, 0.5 * math.sin(number / 2))
         code, summary = drive.end()
         assert (code, summary["without_steering"], summary["pictures"]) == (0, 0, count)
+        assert summary["ended"] == "time"
     finally:
         drive.close()
     return drive.pictures, drive.odometry, drive.truth
@@ -154,13 +155,13 @@ def test_without_steering_the_vehicle_stops_and_says_so(graph: Graph) -> None:
 
 
 def test_steering_that_is_too_old_is_not_obeyed(graph: Graph) -> None:
-    drive = Drive(graph, lockstep_timeout=0.1, seconds=2.0)
+    drive = Drive(graph, lockstep_timeout=0.1, stand_limit=2.0)
     try:
         first = drive.wait_for_picture(1)
         drive.wait_for_picture(8)
         drive.steer(first, 1.0)
         code, summary = drive.end()
-        assert (code, summary["way_m"]) == (0, 0.0)
+        assert (code, summary["way_m"], summary["ended"]) == (0, 0.0, "stands")
         assert any("s old; not obeyed" in line for line in drive.process.log)
     finally:
         drive.close()

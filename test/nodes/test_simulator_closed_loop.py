@@ -14,6 +14,7 @@ from bench.closed_loop import drive, drive_at_box, room_before_box  # noqa: E402
 def test_the_graph_keeps_to_the_middle_of_a_corridor() -> None:
     """From 0.4 m and 10 degrees off, 2 m wide, 1 m/s, body leaning by up to a degree, five pictures a second."""
     driven = drive(seed=4, rate=5)
+    assert driven["ended"] == "lane"
     assert driven["way_m"] >= 30.0
     assert driven["contacts"] == 0, driven
     assert driven["offset_rms_m"] <= 0.030

@@ -21,8 +21,12 @@ from robot_vision.geometry.rotation import quaternion_to_rotation
 from robot_vision.perception import LineDetector, LineSegments
 from robot_vision.perception.odometry import RateHistory
 from robot_vision.perception.way import Kind, WayEstimate, WayEstimator
+from robot_vision.simulation.body import BodyState
 from robot_vision.simulation.lane import PolyLane
+from robot_vision.simulation.record import build_world
+from robot_vision.simulation.renderer import Renderer
 from robot_vision.simulation.road import RoadSettings, winding
+from robot_vision.simulation.sensors import CameraSensor
 
 ROAD_BAG = Path(__file__).resolve().parents[2] / "bags" / "road.mcap"
 RATE = 15
@@ -63,6 +67,21 @@ def test_the_kind_changes_only_once_it_is_sure() -> None:
     frames = [answer.frame for answer in in_a_corridor(estimator, 30, first=51)]
     assert "corridor" not in frames[:RATE]
     assert frames[-1] == "corridor"
+
+
+def test_the_end_of_a_corridor_is_no_road() -> None:
+    """Before the end of a simulated one few uprights are left, for longer than the kind takes to change."""
+    world = build_world("corridor", 4, {"length": 23.0})
+    renderer, sensor, detector = Renderer(world.scene, world.camera), CameraSensor(4), LineDetector()
+    estimator = WayEstimator()
+    for picture, along in enumerate(np.arange(16.3, 20.1, 0.2)):
+        state = BodyState(along, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0)
+        seen = sensor.capture(renderer.render(state.camera_pose(world.camera)))
+        lines = detector.detect(cv2.cvtColor(seen, cv2.COLOR_BGR2GRAY))
+        answer = estimator.update(lines, world.camera, 0.2 * picture, 1.0, 0.0)
+        assert answer.frame == "corridor"
+        if picture >= 3:
+            assert answer.lane is not None and answer.lane.offset == pytest.approx(0.1, abs=0.03)
 
 
 def test_told_what_to_look_for_it_looks_for_nothing_else() -> None:

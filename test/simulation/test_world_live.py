@@ -98,6 +98,19 @@ def test_a_wall_stops_the_robot_and_is_counted_once() -> None:
     assert drive.score.contacts == 2
 
 
+def test_how_long_the_robot_has_stood_is_known() -> None:
+    drive = LiveDrive(hall(), LiveSettings(vehicle=SHARP, delay=0.0, timeout=0.25, rate=10))
+    drive.advance()
+    assert drive.stood_s == pytest.approx(0.1)
+    for speed, turn_rate in ((1.0, 0.0), (0.0, 0.5)):  # one that turns on the spot does not stand
+        drive.steer(speed, turn_rate)
+        drive.advance()
+        assert drive.stood_s == 0.0
+    for _ in range(4):  # the command of 0.2 s is obeyed until 0.45 s, and it is 0.7 s by then
+        drive.advance()
+    assert drive.stood_s == pytest.approx(0.25, abs=2 / 600)
+
+
 def test_what_is_passed_closely_is_measured() -> None:
     box = SceneObject("box", oblong(4, 0.35, 0.3, 0.3), 1.0)
     drive = LiveDrive(hall(box), LiveSettings(rate=10, vehicle=SHARP, settling=1.0))
