@@ -38,6 +38,9 @@ _SPARSE = 3
 _SOWN = 0.014
 #: Blobs larger than so many usual plants are cut.
 _TOO_LARGE = 2.2
+#: What is cut out of leaves by its colour is at least so many times as large as the smallest plant: light on single
+#: leaves comes and goes.
+_LEAST_FOREIGN = 3.0
 #: Share of the ground grown over from which on the crop closes: what stands out then is mostly its own leaves.
 _CLOSES = 0.45
 
@@ -193,7 +196,7 @@ class PlantSegmenter:
         joined = np.asarray(cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel), np.uint8)
         count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
         labels = np.asarray(components, np.int32)
-        count = cut_foreign(window.foreign, labels, count, self.least_area / self.side**2)
+        count = cut_foreign(window.foreign, labels, count, _LEAST_FOREIGN * self.least_area / self.side**2)
         row, column = np.nonzero(grown)
         label = labels[row, column].astype(np.intp)
         if radius is not None:
