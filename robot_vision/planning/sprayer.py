@@ -114,7 +114,7 @@ class SprayPlanner:
             speed: of the robot ahead, m/s; None: not known.
             blind: why the plants are not to be relied on; nothing is sprayed then.
             leaves: (L, 2) where leaves of the crop were seen, as `PlantMap.leaves`: the safety distance is kept from
-                these as well, instead of what is not known of the places of plants. None: nobody has looked.
+                these as well. None: nobody has looked.
         """
         if speed is None:
             blind = blind or "no odometry tells when a weed will be under the boom"
@@ -153,8 +153,7 @@ class SprayPlanner:
         """
         half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
         unsure = np.maximum(np.linalg.det(plants.covariance), 0.0) ** 0.25
-        caution = 0.0 if leaves is not None else _CAUTION
-        reach = plants.radii + np.maximum(self.safety, caution * unsure)
+        reach = plants.radii + np.maximum(self.safety, _CAUTION * unsure)
         crop = plants.kinds != PlantKind.WEED
         places, reach = plants.places[crop], reach[crop]
         if leaves is not None:

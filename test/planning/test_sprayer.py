@@ -160,11 +160,3 @@ def test_jets_keep_off_leaves_that_were_seen_but_for_those_of_the_weed() -> None
     assert whole.radii == pytest.approx([0.02])
     assert part.radii[0] < 0.02
     assert part.places[0, 0] < 0.6
-
-
-def test_where_leaves_were_seen_what_is_not_known_of_the_crop_is_not_kept_as_well() -> None:
-    near = plants((0.6, 0.25, 0.02, WEED), (0.6, 0.4, 0.05, CROP))
-    near.covariance[1] = np.diag([0.06, 0.06]) ** 2
-    planner = SprayPlanner(lanes=10, width=0.1)
-    assert not len(planner.plan(near, 1.0))
-    assert len(planner.plan(near, 1.0, leaves=np.array([[0.6, 0.4]]))) == 1
