@@ -37,7 +37,8 @@ def _last(crop: str) -> NDArray[np.uint8]:
         motion = moved(since)
         rows = tracker.update(picture, world.camera, motion)
         plants = plant_map.update(picture, world.camera, rows, SPACING_M, motion)
-        spray = planner.plan(plants, motion.speed, "" if rows.lane else "no row")
+        blind = "" if rows.lane else "no row"
+        spray = planner.plan(plants, motion.speed, blind, plant_map.leaves)
     drawn = draw_rows(picture.copy(), world.camera, rows)
     return np.asarray(draw_spray(drawn, world.camera, plant_map.lean_seen, plants, spray, planner), np.uint8)
 

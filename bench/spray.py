@@ -22,10 +22,11 @@ SEEDS, QUICK_SEEDS = (1, 2, 3), (1,)
 SECONDS = 8.0
 KEPT, SPRAYED, HIT = at_least(95.0), at_least(90.0), at_most(2.0)
 WITHOUT: dict[str, Callable[[], PlantMap]] = {
-    "without the grid": lambda: PlantMap(judge=PlantJudge(cues=("row", "area"))),
-    "without the size": lambda: PlantMap(judge=PlantJudge(cues=("row", "grid"))),
+    "without the grid": lambda: PlantMap(judge=PlantJudge(cues=("row", "area", "colour"))),
+    "without the size": lambda: PlantMap(judge=PlantJudge(cues=("row", "grid", "colour"))),
+    "without the colour": lambda: PlantMap(judge=PlantJudge(cues=("row", "grid", "area"))),
     "by the row alone": lambda: PlantMap(judge=PlantJudge(cues=("row",))),
-    "without the row": lambda: PlantMap(judge=PlantJudge(cues=("grid", "area"))),
+    "without the row": lambda: PlantMap(judge=PlantJudge(cues=("grid", "area", "colour"))),
     "lean by rows alone": lambda: PlantMap(lean=0.0),
 }
 

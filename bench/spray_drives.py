@@ -125,7 +125,8 @@ def tend(out: Outing, plant_map: PlantMap, planner: SprayPlanner, tally: Tally) 
     for number, seen in enumerate(out.seen):
         began = time.process_time()
         plants = plant_map.update(seen.picture, out.camera, seen.rows, SPACING_M, seen.motion)
-        spray = planner.plan(plants, seen.motion.speed, "" if seen.rows.lane else "no row")
+        blind = "" if seen.rows.lane else "no row"
+        spray = planner.plan(plants, seen.motion.speed, blind, plant_map.leaves)
         tally.seconds.append(time.process_time() - began)
         follower.look(seen.state, plants)
         machine.hear(number / RATE, spray, seen.motion.speed or 0.0)

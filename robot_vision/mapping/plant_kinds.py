@@ -18,8 +18,8 @@ from robot_vision.perception.crop_rows.ground_fit import lateral
 from robot_vision.perception.lane import LaneHeading
 
 Array = NDArray[np.float64]
-Cue = Literal["row", "grid", "area"]
-CUES: tuple[Cue, ...] = ("row", "grid", "area")
+Cue = Literal["row", "grid", "area", "colour"]
+CUES: tuple[Cue, ...] = ("row", "grid", "area", "colour")
 
 #: Distances between plants in a row that are tried: the least and the greatest, m, and their ratio.
 _STEPS = np.geomspace(0.06, 0.9, 201)
@@ -39,7 +39,10 @@ _SELDOM, _SIDE_ROWS = 4, 2
 #: Least plants of a row that show its grid.
 _FEWEST = 3.0
 #: Row, grid and size say at most so much (logarithm of a ratio): a plant that was cut wrongly is out of every grid.
-_MOST, _MOST_GRID, _MOST_AREA = 6.0, 4.0, 4.0
+_MOST, _MOST_GRID, _MOST_AREA, _MOST_COLOUR = 6.0, 4.0, 4.0, 4.0
+#: A plant is foreign when so much of it has another colour than the crop; so many plants of each kind are taken to be,
+#: and not to be, before any is seen.
+_FOREIGN, _DOUBT = 0.5, 0.5
 #: Standard deviation of the logarithm of the area of a kind: least and most.
 _ALIKE = 0.3, 0.8
 _TAU = 2.0 * np.pi
@@ -55,6 +58,7 @@ class InRow:
         along: (N,) way along it, m, from any beginning.
         aside_variance: (N,) m^2.
         log_areas: (N,) of m^2.
+        foreign: (N,) share of each that has another colour than the crop.
     """
 
     row: NDArray[np.intp]
@@ -62,6 +66,7 @@ class InRow:
     along: Array
     aside_variance: Array
     log_areas: Array
+    foreign: Array
 
 
 @dataclass
@@ -82,7 +87,7 @@ class PlantJudge:
     weeds: float = 0.4
     scatter: float = field(default=0.022, init=False, repr=False, compare=False)
     found_step: float | None = field(default=None, init=False, repr=False, compare=False)
-    _learned: Array = field(default_factory=lambda: np.zeros((2, 4)), init=False, repr=False, compare=False)
+    _learned: Array = field(default_factory=lambda: np.zeros((2, 5)), init=False, repr=False, compare=False)
     _spectrum: Array = field(
         default_factory=lambda: np.zeros((2, len(_STEPS))), init=False, repr=False, compare=False
     )
@@ -122,6 +127,8 @@ class PlantJudge:
         self._learn(plants, ratio, spacing)
         if "area" in self.cues:
             ratio = ratio + self._by_area(plants.log_areas)
+        if "colour" in self.cues:
+            ratio = ratio + self._by_colour(plants.foreign)
         return np.asarray(1.0 / (1.0 + np.exp(-np.clip(ratio, -50.0, 50.0))))
 
     def _prior(self) -> float:
@@ -164,8 +171,16 @@ class PlantJudge:
         crop_like = (1.0 - _STUNTED) * usual + _STUNTED * stunted
         return _ratio(_bell(log_areas, small, narrow), crop_like, _MOST_AREA)
 
+    def _by_colour(self, foreign: Array) -> Array:
+        """Weeds may have another colour than the crop, or the same."""
+        if self._learned[:, 3].min() < 5.0 or self._learned[:, 4].max() < 1.0:
+            return np.zeros(len(foreign))
+        shares = (self._learned[:, 4] + _DOUBT) / (self._learned[:, 3] + 2.0 * _DOUBT)
+        crop, weed = np.where(foreign[:, None] >= _FOREIGN, shares, 1.0 - shares).T
+        return _ratio(weed, crop, _MOST_COLOUR)
+
     def _learn(self, plants: InRow, ratio: Array, spacing: float) -> None:
-        """Amount, sum of the logarithms of areas, of their squares, and of squared distances to the row."""
+        """Amount; of sure plants sums of the logarithms of areas and of their squares, number, and of foreign ones."""
         weed = 1.0 / (1.0 + np.exp(-np.clip(ratio, -50.0, 50.0)))
         for kind, share in enumerate((1.0 - weed, weed)):
             sure = np.where(share > 0.8, share, 0.0)
@@ -175,6 +190,7 @@ class PlantJudge:
                     sure @ plants.log_areas,
                     sure @ plants.log_areas**2,
                     sure.sum(),
+                    sure @ (plants.foreign >= _FOREIGN),
                 ]
             )
             self._learned[kind] = _FADES * self._learned[kind] + (1.0 - _FADES) * own
@@ -211,7 +227,13 @@ class PlantJudge:
 
 
 def in_rows(
-    places: Array, covariance: Array, log_areas: Array, lane: LaneHeading, spacing: float, scatter: float
+    places: Array,
+    covariance: Array,
+    log_areas: Array,
+    foreign: Array,
+    lane: LaneHeading,
+    spacing: float,
+    scatter: float,
 ) -> InRow:
     """Where plants stand in the rows, whose lines the plants near them shift a little.
 
@@ -219,6 +241,7 @@ def in_rows(
         places: (N, 2) in base_link, m.
         covariance: (N, 2, 2) of them.
         log_areas: (N,) of m^2.
+        foreign: (N,) share of each that has another colour than the crop.
         lane: the robot in its row.
         spacing: between rows, m.
         scatter: of the crop about its row, m.
@@ -236,7 +259,7 @@ def in_rows(
         known = weighted.T @ design + np.diag(_LINE_KNOWN**-2.0)
         line = np.asarray(np.linalg.solve(known, weighted.T @ aside), np.float64)
     off = aside - design @ line
-    return InRow(row, off, along, covariance[:, 1, 1], log_areas)
+    return InRow(row, off, along, covariance[:, 1, 1], log_areas, foreign)
 
 
 def _ratio(weed: Array | float, crop: Array, most: float = _MOST) -> Array:

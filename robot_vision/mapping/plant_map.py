@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.mapping.plant_errors import common_lean, other_rows, pose_noise, stem_noise
 from robot_vision.mapping.plant_kinds import PlantJudge, in_rows
+from robot_vision.mapping.plant_leaves import LeafCover
 from robot_vision.mapping.plant_matching import blob_noise, look_for, matched, shift_noise
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift, by_lean, common_shift
 from robot_vision.mapping.plant_tracks import KNOWN_AGE, PlantTracks, Stature
@@ -26,8 +27,10 @@ from robot_vision.perception.crop_rows.plant_blobs import (
     GroundWindow,
     Lean,
     PlantSegmenter,
+    middle_of_rows,
     row_radius,
 )
+from robot_vision.perception.crop_rows.plant_colours import CropColour
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.tracker import RowEstimate
 from robot_vision.perception.lane import LaneHeading
@@ -39,8 +42,9 @@ Mask = NDArray[np.bool_]
 
 #: Standard deviation of roll and pitch where no rows tell them, rad.
 _UNSEEN_LEAN = 0.02
-#: Where the crop closes its own leaves stand out: a weed has been shown by so many pictures, as tips of leaves come and
-#: go, and is smaller than this share of the radius of a usual plant, as whole branches do not.
+#: Where the crop closes its own leaves stand out: a plant of its colour is known once so many pictures have shown
+#: it, as tips of leaves come and go, and a weed is smaller than this share of the radius of a usual plant, as whole
+#: branches are not.
 _SURE_AGE, _SMALL = 5, 0.35
 #: Share of a picture's word on how large plants are.
 _SLOWLY = 0.1
@@ -48,6 +52,8 @@ _SLOWLY = 0.1
 _AS_LARGE = 0.15
 #: Least and greatest height of the middle of a plant of the crop, in radii.
 _STATURES = 0.25, 1.2
+#: Plants of which so much has another colour than the crop are none of it.
+_FOREIGN = 0.5
 #: New plants keep so many radii from known ones.
 _OWN_GROUND = 0.5
 
@@ -65,6 +71,7 @@ class PlantMap:
         behind: plants so far behind base_link are forgotten, m.
         sure: probability from which on a plant is called a weed.
         mask: of leaves.
+        colour: of the crop; only pictures in colour have one.
         judge: of crop and weeds.
 
     Raises:
@@ -79,11 +86,13 @@ class PlantMap:
     behind: float = 2.0
     sure: float = 0.85
     mask: LeafMask = field(default_factory=LeafMask)
+    colour: CropColour = field(default_factory=CropColour)
     judge: PlantJudge = field(default_factory=PlantJudge)
     radius: float | None = field(default=None, init=False, compare=False)
     tracks: PlantTracks = field(default_factory=PlantTracks.none, init=False, repr=False, compare=False)
     pose: Pose = field(default=Pose(0.0, 0.0, 0.0), init=False, compare=False)
     shift: Shift | None = field(default=None, init=False, repr=False, compare=False)
+    _cover: LeafCover = field(default_factory=LeafCover, init=False, repr=False, compare=False)
     _next: int = field(default=1, init=False, repr=False, compare=False)
     _lean: Lean = field(default=Lean(), init=False, repr=False, compare=False)
     _tall: float = field(default=0.6, init=False, repr=False, compare=False)
@@ -103,6 +112,14 @@ class PlantMap:
             raise ValueError(f"lean must lie in [0, 0.5) rad, not {self.lean}")
 
     @property
+    def leaves(self) -> Array | None:
+        """Where leaves of the crop were seen: middles (L, 2) of cells, ahead and left of base_link, m.
+
+        None where the crop does not close: there plants tell more of what is hidden.
+        """
+        return self._cover.places(self.pose) if self._closes and not self._blind else None
+
+    @property
     def lean_seen(self) -> Lean:
         """How the body leaned in the last picture, as rows and plants have it."""
         if self.shift is None:
@@ -115,6 +132,8 @@ class PlantMap:
         self.tracks = PlantTracks.none()
         self.pose, self.shift, self.radius = Pose(0.0, 0.0, 0.0), None, None
         self.judge.reset()
+        self.colour.reset()
+        self._cover.reset()
 
     def move(self, motion: Motion) -> None:
         """Go on by what the robot did; without a speed nobody knows where the plants are now.
@@ -124,6 +143,7 @@ class PlantMap:
         """
         if motion.speed is None:
             self.tracks, self.shift = PlantTracks.none(), None
+            self._cover.reset()
             return
         turn = (motion.turn_rate or 0.0) * motion.seconds
         way = motion.speed * motion.seconds
@@ -173,7 +193,10 @@ class PlantMap:
         self._lean = lean
         self._sigmas[[ROLL, PITCH]] = sigma
         mask = self.mask.of(picture)
-        window = self.segmenter.look(mask, camera, lean)
+        # where leaves do not close, their shape tells plants apart, and more surely
+        colours = self.colour.of(picture) if self._closes and self.mask.by_colour(picture) else None
+        foreign = None if colours is None else self.colour.foreign(colours, mask)
+        window = self.segmenter.look(mask, camera, lean, foreign)
         if rows.rows is not None:
             radius = row_radius(window, rows.rows.values, spacing)
             if radius is not None:
@@ -184,18 +207,25 @@ class PlantMap:
                 self.radius = (
                     radius if self.radius is None else self.radius + _SLOWLY * (radius - self.radius)
                 )
+            if colours is not None and self.radius is not None:
+                crop = middle_of_rows(window, rows.rows.values, spacing, self.radius)
+                self.colour.learn(self.segmenter.lay_out(colours, camera, lean)[crop])
         self._closes = window.closes
         self.see(window, camera, lean)
+        if self._closes:
+            self._cover.see(window, self.pose)
 
     def _told(self, lane: LaneHeading | None, spacing: float) -> Plants:
         """The plants that are known, as seen from the robot."""
         tracks = self.tracks
         known = tracks.ages >= (1 if self._blind else KNOWN_AGE)
+        if self._closes and not self._blind:
+            known &= (tracks.ages >= _SURE_AGE) | (tracks.foreign >= _FOREIGN)
         cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
         to_base = np.array([[cosine, sine], [-sine, cosine]])
         field_places = tracks.states[known, :2]
         places = (field_places - (self.pose.x, self.pose.y)) @ to_base.T
-        log_areas = tracks.log_areas[known]
+        log_areas, foreign = tracks.log_areas[known], tracks.foreign[known]
         covariance = np.asarray(to_base @ tracks.covariances[known, :2, :2] @ to_base.T)
         radii = np.sqrt(np.exp(log_areas) / np.pi)
         large = radii > _SMALL * (self.radius or np.inf)
@@ -205,12 +235,12 @@ class PlantMap:
         weed = np.full(len(places), np.nan)
         if lane is not None:
             weed = self.judge.judge(
-                in_rows(places, covariance, log_areas, lane, spacing, self.judge.scatter), spacing
+                in_rows(places, covariance, log_areas, foreign, lane, spacing, self.judge.scatter), spacing
             )
         kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
         kinds[weed > self.sure] = PlantKind.WEED
         if self._closes:
-            kinds[large | (tracks.ages[known] < _SURE_AGE)] = PlantKind.UNSURE
+            kinds[large & (foreign < _FOREIGN)] = PlantKind.UNSURE
         kinds[weed < 0.5] = PlantKind.CROP
         return Plants(
             tracks.ids[known],
@@ -228,7 +258,8 @@ class PlantMap:
         """Match the plants of a window with those that are known, and correct these."""
         assert camera.height_m is not None
         self._height = camera.height_m
-        known = self.tracks.seen_from(self.pose, camera.x_m)[0][self.tracks.ages >= KNOWN_AGE]
+        alike = (self.tracks.ages >= KNOWN_AGE) & (self.tracks.foreign < _FOREIGN)
+        known = self.tracks.seen_from(self.pose, camera.x_m)[0][alike]
         places = known * (window.fall / camera.height_m) + (camera.x_m, 0.0)
         blobs = self.segmenter.cut(window, camera, lean, self.radius, places)
         height = camera.height_m
@@ -255,7 +286,8 @@ class PlantMap:
             camera.x_m,
         )
         q = np.exp(tracks.states[mine, 2])
-        tracks.see_areas(mine, blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2)
+        areas = blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2
+        tracks.see_looks(mine, areas, blobs.foreign[theirs])
         alone = np.ones(len(tracks), bool)
         alone[mine] = False
         places = expected * (window.fall / height) + (camera.x_m, 0.0)
@@ -309,7 +341,9 @@ class PlantMap:
             expected, _ = self.tracks.seen_from(self.pose, camera.x_m)
             radius = np.sqrt(np.exp(self.tracks.log_areas) / np.pi)
             away = np.linalg.norm(seen[new][:, None, :] - expected[None, :, :], axis=2)
-            new[np.flatnonzero(new)[(away < _OWN_GROUND * radius).any(axis=1)]] = False
+            strange = blobs.foreign[new] >= _FOREIGN
+            alike = ~strange[:, None] | (self.tracks.foreign >= _FOREIGN)
+            new[np.flatnonzero(new)[((away < _OWN_GROUND * radius) & alike).any(axis=1)]] = False
         count = int(new.sum())
         if count:
             self.tracks.begin(
@@ -318,6 +352,7 @@ class PlantMap:
                 noise[new],
                 common[new],
                 blobs.areas[new] * np.exp(-2.0 * blobs.lean.height),
+                blobs.foreign[new],
                 self.pose,
                 camera.x_m,
                 camera.height_m,

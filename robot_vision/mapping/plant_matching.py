@@ -15,6 +15,8 @@ Rows = NDArray[np.intp]
 
 #: Standard deviation by which two pictures of one plant differ in the logarithm of its area.
 _AREA_SIGMA = 0.6
+#: The same of the share of it that has another colour than the crop.
+_FOREIGN_SIGMA = 0.5
 #: How far from all that is seen a plant may be expected and yet be among it, m.
 _BEYOND = 0.3
 #: Share of the ground about a plant's place below which it is bare.
@@ -57,6 +59,7 @@ def matched(
     cost = (d * x * x - 2.0 * b * x * y + a * y * y) / (a * d - b * b)
     size = np.log(blobs.areas)[None, :] - (tracks.log_areas - 2.0 * tracks.states[:, 2])[near, None]
     cost = cost + np.where(blobs.whole[None, :], (size / _AREA_SIGMA) ** 2, 2.0)
+    cost = cost + ((blobs.foreign[None, :] - tracks.foreign[near, None]) / _FOREIGN_SIGMA) ** 2
     cost[cost > gate] = _NEVER
     mine, theirs = linear_sum_assignment(cost)
     good = cost[mine, theirs] < _NEVER

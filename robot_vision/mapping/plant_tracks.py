@@ -63,6 +63,7 @@ class PlantTracks:
         covariances: (N, 3, 3).
         shared: (N, 3, 2) covariance of the error of the state with the common one, in standard deviations of that.
         log_areas: (N,) of m^2.
+        foreign: (N,) share of it that has another colour than the crop.
         ages: (N,) pictures that showed it.
         missed: (N,) pictures in a row that showed bare ground in its place.
         hidden: (N,) pictures in a row that showed other leaves in its place.
@@ -73,6 +74,7 @@ class PlantTracks:
     covariances: Array
     shared: Array
     log_areas: Array
+    foreign: Array
     ages: NDArray[np.intp]
     missed: NDArray[np.intp]
     hidden: NDArray[np.intp]
@@ -89,6 +91,7 @@ class PlantTracks:
             np.zeros((0, 3)),
             np.zeros((0, 3, 3)),
             np.zeros((0, 3, 2)),
+            np.zeros(0),
             np.zeros(0),
             count,
             count.copy(),
@@ -152,12 +155,13 @@ class PlantTracks:
         self.covariances[rows] = 0.5 * (after + _turned(after))
         self.shared[rows] = shared - gain @ surely
 
-    def see_areas(self, rows: NDArray[np.intp], areas: Array) -> None:
-        """Take in how large plants (M,) are, m^2, and that they were seen."""
+    def see_looks(self, rows: NDArray[np.intp], areas: Array, foreign: Array) -> None:
+        """Take in how large plants (M,) are, m^2, how much of them is foreign (M,), and that they were seen."""
         self.ages[rows] += 1
         self.missed[rows] = self.hidden[rows] = 0
         share = np.maximum(1.0 / self.ages[rows], 1.0 / _MEMORY)
         self.log_areas[rows] += share * (np.log(areas) - self.log_areas[rows])
+        self.foreign[rows] += share * (foreign - self.foreign[rows])
 
     def begin(
         self,
@@ -166,6 +170,7 @@ class PlantTracks:
         noise: Array,
         common: Array,
         areas: Array,
+        foreign: Array,
         pose: Pose,
         camera_x: float,
         height: float,
@@ -179,6 +184,7 @@ class PlantTracks:
             noise: (M, 2, 2) of it, without the common error.
             common: (M, 2, 2) what the common error does to it, m a standard deviation.
             areas: (M,) as they appear on the ground, m^2.
+            foreign: (M,) share of them that has another colour than the crop.
             pose: of the robot in the field.
             camera_x: of the camera ahead of base_link, m.
             height: of the camera, m.
@@ -209,6 +215,7 @@ class PlantTracks:
             covariances,
             shared,
             np.log(areas * q**2),
+            foreign.copy(),
             np.ones(count, np.intp),
             np.zeros(count, np.intp),
             np.zeros(count, np.intp),

@@ -231,7 +231,7 @@ class CropRowSteeringNode(SteeringNode):
         plants = self._plant_map.update(picture, camera, estimate, self._tracker.spacing, self._moved)
         self._plants.publish(plant_messages.plants_to_message(header, plants))
         blind = "" if estimate.lane is not None else f"no row is known: {estimate.reason}"
-        spray = self._sprayer.plan(plants, self._moved.speed, blind)
+        spray = self._sprayer.plan(plants, self._moved.speed, blind, self._plant_map.leaves)
         self._spray.publish(plant_messages.spray_to_message(header, spray))
         self._tended = plants, spray
         counts = {fate: int(self._sprayer.counts[fate]) for fate in Fate}

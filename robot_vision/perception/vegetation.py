@@ -208,6 +208,10 @@ class LeafMask:
         if not 1 <= self.around <= 99:
             raise ValueError(f"around must lie in [1, 99] px, not {self.around}")
 
+    def by_colour(self, picture: Picture) -> bool:
+        """Whether leaves of a picture are told by their colour."""
+        return picture.ndim == 3 and self.index != "infrared"
+
     def of(self, picture: Picture) -> NDArray[np.bool_]:
         """Mask (H, W) of leaves in a picture, uint8 (H, W, 3) BGR or (H, W).
 

@@ -9,6 +9,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_vision.mapping.plant_leaves import CELL_M
 from robot_vision.mapping.plants import PlantKind, Plants
 
 Array = NDArray[np.float64]
@@ -17,6 +18,8 @@ Array = NDArray[np.float64]
 _AIM, _LEAST_AIM = 0.5, 0.008
 #: From what may be crop at least so many standard deviations of its place are kept.
 _CAUTION = 1.0
+#: Leaves this near to a weed's own circle may be its own; farther off than the other they do not matter, m.
+_OWN, _ASIDE = 0.012, 0.15
 #: Slower than this nobody can say when a weed comes under the nozzle, m/s.
 _SLOWEST = 0.05
 
@@ -101,13 +104,17 @@ class SprayPlanner:
         self._ahead.clear()
         self.counts[:] = 0
 
-    def plan(self, plants: Plants, speed: float | None, blind: str = "") -> Spray:
+    def plan(
+        self, plants: Plants, speed: float | None, blind: str = "", leaves: Array | None = None
+    ) -> Spray:
         """Say what to spray and when.
 
         Args:
             plants: around the robot now.
             speed: of the robot ahead, m/s; None: not known.
             blind: why the plants are not to be relied on; nothing is sprayed then.
+            leaves: (L, 2) where leaves of the crop were seen, as `PlantMap.leaves`: the safety distance is kept from
+                these as well. None: nobody has looked.
         """
         if speed is None:
             blind = blind or "no odometry tells when a weed will be under the boom"
@@ -119,7 +126,7 @@ class SprayPlanner:
         reached = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + plants.radii
         reached &= plants.places[:, 0] > self.boom_x - plants.radii - self.margin - self.latency * speed
         weeds = np.flatnonzero((plants.kinds == PlantKind.WEED) & reached)
-        begin, end = self._clear(plants, weeds)
+        begin, end = self._clear(plants, weeds, leaves)
         ahead = plants.places[weeds, 0] - self.boom_x
         in_time = ahead[:, None] + end > self.latency * speed
         aim = np.maximum(_AIM * plants.radii[weeds], _LEAST_AIM)
@@ -137,7 +144,7 @@ class SprayPlanner:
         parts.areas[:] = np.pi * (0.5 * (end - begin) - self.margin) ** 2
         return Spray(parts, lane, (parts.places[:, 0] - self.boom_x) / speed - self.latency)
 
-    def _clear(self, plants: Plants, weeds: NDArray[np.intp]) -> tuple[Array, Array]:
+    def _clear(self, plants: Plants, weeds: NDArray[np.intp], leaves: Array | None) -> tuple[Array, Array]:
         """The part of the way about each weed (M,) on which a jet of each lane keeps off what may be crop.
 
         Returns:
@@ -147,14 +154,20 @@ class SprayPlanner:
         half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
         unsure = np.maximum(np.linalg.det(plants.covariance), 0.0) ** 0.25
         reach = plants.radii + np.maximum(self.safety, _CAUTION * unsure)
-        wide = np.abs(plants.places[:, 1]) < 0.5 * self.lanes * self.width + reach
-        crop = np.flatnonzero((plants.kinds != PlantKind.WEED) & wide)
-        if not len(crop) or not len(weeds):
+        crop = plants.kinds != PlantKind.WEED
+        places, reach = plants.places[crop], reach[crop]
+        if leaves is not None:
+            covered = _beside(leaves, plants.places[weeds], plants.radii[weeds])
+            places = np.concatenate([places, covered])
+            reach = np.concatenate([reach, np.full(len(covered), self.safety + 0.5 * CELL_M)])
+        wide = np.abs(places[:, 1]) < 0.5 * self.lanes * self.width + reach
+        places, reach = places[wide], reach[wide]
+        if not len(places) or not len(weeds):
             return -half, half
-        aside = np.abs(plants.places[crop, 1, None] - self.middles[None, :]) - 0.5 * self.width
-        near = aside < reach[crop, None]
-        chord = np.sqrt(np.maximum(reach[crop, None] ** 2 - np.maximum(aside, 0.0) ** 2, 0.0))
-        away = (plants.places[None, crop, 0] - plants.places[weeds, None, 0])[:, :, None]
+        aside = np.abs(places[:, 1, None] - self.middles[None, :]) - 0.5 * self.width
+        near = aside < reach[:, None]
+        chord = np.sqrt(np.maximum(reach[:, None] ** 2 - np.maximum(aside, 0.0) ** 2, 0.0))
+        away = (places[None, :, 0] - plants.places[weeds, None, 0])[:, :, None]
         behind = np.where(near & (away < 0.0), away + chord, -np.inf).max(axis=1)
         before = np.where(near & (away >= 0.0), away - chord, np.inf).min(axis=1)
         return np.maximum(-half, behind), np.minimum(half, before)
@@ -175,6 +188,15 @@ class SprayPlanner:
             number: Fate(fate)
             for number, fate in zip(plants.ids[there].tolist(), fates[there].tolist(), strict=True)
         }
+
+
+def _beside(leaves: Array, weeds: Array, radii: Array) -> Array:
+    """Those of the leaves (L, 2) near weeds (M, 2) of such radii (M,) that are not their own."""
+    square = np.zeros((len(leaves), len(weeds)))
+    for axis in range(2):
+        square += (leaves[:, None, axis] - weeds[None, :, axis]) ** 2
+    near = (square < (radii + _ASIDE) ** 2).any(axis=1)
+    return np.asarray(leaves[near & (square > (radii + _OWN) ** 2).all(axis=1)])
 
 
 def _marked(plants: Plants, which: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -28,11 +28,15 @@ _ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 @dataclass(frozen=True)
 class Scene:
-    """Plants in the field: places (N, 2), m, radii (N,), m, and which (N,) are weeds; rows run along x."""
+    """Plants in the field: places (N, 2), m, radii (N,), m, and which (N,) are weeds; rows run along x.
+
+    Weeds are of a colour of their own, if one is given.
+    """
 
     places: Array
     radii: Array
     weed: NDArray[np.bool_]
+    weed_leaf: tuple[int, int, int] = LEAF
 
     def seen_from(self, pose: Pose) -> Array:
         """Places (N, 2) in base_link, m."""
@@ -44,14 +48,15 @@ class Scene:
         """What the camera sees, BGR."""
         picture = np.full((CAMERA.height, CAMERA.width, 3), SOIL, np.uint8)
         leaning = rotation_from_rpy(roll, pitch, 0.0) @ CAMERA.optical_to_base
-        for place, radius in zip(self.seen_from(pose), self.radii, strict=True):
+        for place, radius, weed in zip(self.seen_from(pose), self.radii, self.weed, strict=True):
             outline = place + radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
             if not 0.2 < place[0] < 6.0:
                 continue
             leaves = np.column_stack([outline, np.full(len(outline), TALL * radius - HEIGHT)])
             corners = CAMERA.pixels(leaves @ leaning)
+            leaf = self.weed_leaf if weed else LEAF
             if np.isfinite(corners).all() and np.abs(corners).max() < 4000:
-                cv2.fillPoly(picture, [np.rint(corners * 16).astype(np.int32)], LEAF, cv2.LINE_AA, 4)
+                cv2.fillPoly(picture, [np.rint(corners * 16).astype(np.int32)], leaf, cv2.LINE_AA, 4)
         return picture
 
 

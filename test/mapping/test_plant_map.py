@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant_scenes import CAMERA, HEIGHT, SPACING, STEP, TALL, Scene, rows_seen, sown
+from plant_scenes import CAMERA, HEIGHT, LEAF, SPACING, STEP, TALL, Scene, rows_seen, sown
 
 from robot_vision.mapping.plant_errors import common_lean
 from robot_vision.mapping.plant_kinds import InRow, PlantJudge
@@ -214,7 +214,7 @@ def test_the_step_of_the_grid_and_a_weed_in_the_row_are_found() -> None:
         row, along, aside = (
             np.append(part, own) for part, own in ((row, 0), (along, 1.5 * STEP), (aside, 0.0))
         )
-        plants = InRow(row, aside, along, np.full(81, 1e-6), np.full(81, math.log(0.005)))
+        plants = InRow(row, aside, along, np.full(81, 1e-6), np.full(81, math.log(0.005)), np.zeros(81))
         weed = judge.judge(plants, SPACING)
     assert judge.found_step == pytest.approx(STEP, rel=0.02)
     assert weed[-1] > 5.0 * np.median(weed[:-1])
@@ -240,6 +240,46 @@ def test_plants_and_weeds_are_told_in_the_near_infrared_as_in_colour() -> None:
     alike = away[np.arange(count), nearest] < 0.015
     assert alike.mean() > 0.95
     assert (told["colour"].kinds == told["mono8"].kinds[nearest])[alike].mean() > 0.95
+
+
+def test_what_grows_in_the_row_and_has_the_colour_of_weeds_is_one() -> None:
+    random = np.random.default_rng(9)
+    row, along = np.repeat(np.arange(-2, 3), 20), np.tile(STEP * np.arange(20), 5)
+    crop, foreign = np.zeros(100), np.repeat([0.0, 1.0, 0.0], (100, 20, 2))
+    foreign[120] = 1.0
+    row = np.concatenate([row, random.integers(-2, 3, 20), [0, 0]])
+    along = np.concatenate([along, random.uniform(0.0, 5.0, 20), [1.1, 3.6]])
+    aside = np.concatenate([crop, np.full(20, 0.2), [0.03, 0.03]])
+    plants = InRow(row, aside, along, np.full(122, 1e-6), np.full(122, math.log(0.005)), foreign)
+    by_colour, without = PlantJudge(), PlantJudge(cues=("row", "grid", "area"))
+    for _ in range(15):
+        told, before = by_colour.judge(plants, SPACING), without.judge(plants, SPACING)
+    assert told[120] > max(0.9, before[120])
+    assert told[121] <= before[121]
+
+
+def test_weeds_that_grow_into_a_closed_crop_are_known_by_their_colour() -> None:
+    along, row = np.meshgrid(np.arange(0.1, 5.0, STEP), np.arange(-2, 3) * SPACING, indexing="ij")
+    crop = np.column_stack([along.ravel(), row.ravel()])
+    weeds = np.column_stack([np.arange(1.3, 3.4, 0.3), 0.18 * np.array([1, -1, 1, -1, 1, -1, 1])])
+    radii = np.append(np.full(len(crop), 0.17), np.full(len(weeds), 0.025))
+    weed = np.arange(len(radii)) >= len(crop)
+    found = dict[bool, int]()
+    for other in (True, False):
+        scene = Scene(np.concatenate([crop, weeds]), radii, weed, (100, 170, 140) if other else LEAF)
+        plant_map = PlantMap()
+        pose, plants = driven(scene, plant_map, 12)[-1]
+        near = same(scene, pose, plants, 0.03)
+        mine = [near[n] for n in np.flatnonzero(weed).tolist() if n in near]
+        found[other] = int((plants.kinds[mine] == PlantKind.WEED).sum())
+        leaves = plant_map.leaves
+        assert leaves is not None
+        here = scene.seen_from(pose)
+        beside = (here[:, 0] > 0.0) & (here[:, 0] < 0.9) & (np.abs(here[:, 1]) < 0.6)
+        away = np.linalg.norm(here[beside, None] - leaves[None], axis=2).min(axis=1)
+        assert away[~weed[beside]].max() < 0.02
+    assert found[True] >= 6
+    assert found[False] <= 1
 
 
 def test_a_readier_preset_calls_more_plants_weeds() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A weed that touches a plant of the crop is cut off it; lobes of the crop's own leaves are not."""
+"""A weed that touches a plant of the crop is cut off it, by shape or colour; lobes of the crop's own leaves are not."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robot_vision.perception.crop_rows.plant_bodies import cut_beside
+from robot_vision.perception.crop_rows.plant_bodies import cut_beside, cut_foreign
 
 RADIUS, SIDE = 25.0, 0.006
 Array = NDArray[np.generic]
@@ -48,3 +48,28 @@ def test_weeds_alone_stay_whole() -> None:
 
 def test_several_plants_grown_together_are_left_alone() -> None:
     assert _cut((70, 70, 25), (99, 70, 5), most=1500.0)[0] == 2
+
+
+def _foreign(*discs: tuple[int, int, int, bool]) -> tuple[int, Array]:
+    """Discs, of which some have another colour than the crop."""
+    grown, foreign = np.zeros((2, 160, 160), np.uint8)
+    for x, y, radius, other in discs:
+        cv2.circle(grown, (x, y), radius, 1, -1)
+        cv2.circle(foreign, (x, y), radius, int(other), -1)
+    count, components = cv2.connectedComponents(grown, connectivity=8, ltype=cv2.CV_32S)
+    labels = np.asarray(components, np.int32)
+    return cut_foreign(foreign > 0, labels, count, 6.0), labels
+
+
+def test_a_weed_within_leaves_is_cut_out_by_its_colour() -> None:
+    count, labels = _foreign((70, 70, 40, False), (80, 70, 5, True), (60, 75, 5, True), (70, 50, 1, True))
+    assert count == 4
+    assert len({labels[70, 70], labels[70, 80], labels[75, 60]}) == 3
+    assert labels[50, 70] == labels[70, 70]
+    assert np.count_nonzero(labels == labels[70, 80]) == np.count_nonzero(labels == labels[75, 60])
+
+
+def test_a_weed_alone_keeps_what_has_the_colour_of_the_crop() -> None:
+    count, labels = _foreign((70, 70, 8, True), (70, 70, 3, False))
+    assert count == 2
+    assert labels.max() == 1

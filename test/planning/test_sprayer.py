@@ -145,3 +145,18 @@ def test_what_became_of_the_plants_is_counted_once() -> None:
 def test_settings_without_meaning_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         SprayPlanner(**wrong)  # type: ignore[arg-type]
+
+
+def test_jets_keep_off_leaves_that_were_seen_but_for_those_of_the_weed() -> None:
+    planner = SprayPlanner(lanes=10, width=0.1, safety=0.02, margin=0.01)
+    weed = plants((0.6, 0.25, 0.02, WEED))
+    own = np.array([[0.6, 0.25], [0.61, 0.26]])
+    for gap, sprayed in ((0.01, False), (0.08, True)):
+        leaves = np.append(own, [[0.6, 0.3 + gap]], axis=0)
+        assert (len(planner.plan(weed, 1.0, leaves=leaves)) == 1) == sprayed
+    whole, part = (
+        planner.plan(weed, 1.0, leaves=seen).weeds for seen in (own, np.append(own, [[0.65, 0.25]], axis=0))
+    )
+    assert whole.radii == pytest.approx([0.02])
+    assert part.radii[0] < 0.02
+    assert part.places[0, 0] < 0.6

@@ -8,6 +8,7 @@ side. The ground is looked at from above in a window of square cells, at the hei
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.geometry.rotation import rotation_from_rpy
 from robot_vision.perception.crop_rows.ground_fit import lateral
-from robot_vision.perception.crop_rows.plant_bodies import bodies, cut_beside
+from robot_vision.perception.crop_rows.plant_bodies import bodies, cut_beside, cut_foreign
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,10 +30,17 @@ _GROWS, _CUT = 1, 3
 _NEW = 1.3
 #: Ground that tells how wide rows are (m ahead of the nearest), in so many bins; fewest cells and rounds of the fit.
 _NEAR_M, _BINS, _FEWEST_CELLS, _ROUNDS = 1.2, 60, 100, 20
+#: What grows this near to the line of a row tells the colour of the crop, radii of a usual plant.
+_MIDDLE = 0.5
+#: One in so many rows and columns of cells is asked for it.
+_SPARSE = 3
 #: Standard deviation of a plant about the line of its row, m.
 _SOWN = 0.014
 #: Blobs larger than so many usual plants are cut.
 _TOO_LARGE = 2.2
+#: What is cut out of leaves by its colour is at least so many times as large as the smallest plant: light on single
+#: leaves comes and goes.
+_LEAST_FOREIGN = 3.0
 #: Share of the ground grown over from which on the crop closes: what stands out then is mostly its own leaves.
 _CLOSES = 0.45
 
@@ -56,12 +64,14 @@ class Blobs:
         areas: (N,) on the plane of the window, m^2.
         whole: (N,) whether all of it is in the picture.
         lean: the one taken.
+        foreign: (N,) share of each that has another colour than the crop.
     """
 
     slopes: Array
     areas: Array
     whole: Mask
     lean: Lean
+    foreign: Array
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -74,6 +84,7 @@ class GroundWindow:
     Attributes:
         cells: uint8 (rows, columns); row 0 the nearest, column 0 the rightmost; 0 bare or not in the picture.
         seen: bool (rows, columns): in the picture, not at its border.
+        foreign: bool (rows, columns): what grows there has another colour than the crop.
         corner: (2,) ahead and left of base_link of the middle of cell (0, 0), m.
         side: of a cell, m.
         fall: height of the camera over the window's plane, m.
@@ -81,6 +92,7 @@ class GroundWindow:
 
     cells: NDArray[np.uint8]
     seen: Mask
+    foreign: Mask
     corner: Array
     side: float
     fall: float
@@ -127,28 +139,43 @@ class PlantSegmenter:
         if self.far * self.aside / self.side**2 > 4e6:
             raise ValueError(f"cells of {self.side:g} m are too many for {self.far:g} m of ground")
 
-    def look(self, mask: Mask, camera: Camera, lean: Lean) -> GroundWindow:
-        """Lay a mask (H, W) out on the ground, for a body that leans."""
+    def look(self, mask: Mask, camera: Camera, lean: Lean, foreign: Mask | None = None) -> GroundWindow:
+        """Lay a mask (H, W) out on the ground, for a body that leans.
+
+        Args:
+            mask: of what grows.
+            camera: rectified.
+            lean: of the body.
+            foreign: (H, W) the part of it that has another colour than the crop; None: nobody knows.
+        """
         assert camera.height_m is not None
-        fall = camera.height_m * float(np.exp(lean.height))
-        near = nearest_ground(camera, lean)
-        rows = max(int((self.far - near) / self.side), 8)
-        columns = 2 * int(self.aside / self.side) + 1
-        corner = np.array([camera.x_m + near, -self.side * (columns // 2)])
-        to_pixels = _pixels_of_plane(camera, lean, fall)
-        # (column, row, 1) of the window to (ahead, left, 1) of the camera
-        grid = np.array([[0.0, self.side, near], [self.side, 0.0, corner[1]], [0.0, 0.0, 1.0]])
         marks = mask.astype(np.uint8)
         inner = marks[_BORDER:-_BORDER, _BORDER:-_BORDER].copy()
         marks *= _CUT
         marks[_BORDER:-_BORDER, _BORDER:-_BORDER] = inner
         frame = np.zeros_like(marks)
         frame[_BORDER:-_BORDER, _BORDER:-_BORDER] = 1
-        size = columns, rows
+        cells, seen = (self.lay_out(part, camera, lean) for part in (marks, frame))
+        strange = np.zeros_like(cells)
+        if foreign is not None and foreign.any():
+            strange = self.lay_out(foreign.view(np.uint8), camera, lean)
+        near = nearest_ground(camera, lean)
+        corner = np.array([camera.x_m + near, -self.side * (cells.shape[1] // 2)])
+        fall = camera.height_m * float(np.exp(lean.height))
+        return GroundWindow(cells, seen.astype(np.bool_), strange.astype(np.bool_), corner, self.side, fall)
+
+    def lay_out(self, picture: NDArray[Any], camera: Camera, lean: Lean) -> NDArray[Any]:
+        """The cells (rows, columns) of a window on what is (H, W) in a picture; 0 where it ends."""
+        assert camera.height_m is not None
+        near = nearest_ground(camera, lean)
+        rows = max(int((self.far - near) / self.side), 8)
+        columns = 2 * int(self.aside / self.side) + 1
+        # (column, row, 1) of the window to (ahead, left, 1) of the camera
+        rightmost = -self.side * (columns // 2)
+        grid = np.array([[0.0, self.side, near], [self.side, 0.0, rightmost], [0.0, 0.0, 1.0]])
+        to_pixels = _pixels_of_plane(camera, lean, camera.height_m * float(np.exp(lean.height))) @ grid
         flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-        cells = cv2.warpPerspective(marks, to_pixels @ grid, size, flags=flags)
-        seen = cv2.warpPerspective(frame, to_pixels @ grid, size, flags=flags)
-        return GroundWindow(np.asarray(cells), np.asarray(seen, np.bool_), corner, self.side, fall)
+        return np.asarray(cv2.warpPerspective(picture, to_pixels, (columns, rows), flags=flags))
 
     def cut(
         self, window: GroundWindow, camera: Camera, lean: Lean, radius: float | None, known: Array
@@ -169,6 +196,7 @@ class PlantSegmenter:
         joined = np.asarray(cv2.morphologyEx(grown, cv2.MORPH_CLOSE, kernel), np.uint8)
         count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
         labels = np.asarray(components, np.int32)
+        count = cut_foreign(window.foreign, labels, count, _LEAST_FOREIGN * self.least_area / self.side**2)
         row, column = np.nonzero(grown)
         label = labels[row, column].astype(np.intp)
         if radius is not None:
@@ -187,7 +215,8 @@ class PlantSegmenter:
         places = window.corner + self.side * middle
         slopes = (places - np.array([camera.x_m, 0.0])) / window.fall
         areas = np.minimum(amount, _disc(row, column, label, middle, slopes, amount)) * self.side**2
-        return Blobs(slopes[kept], areas[kept], ~cut[kept], lean)
+        strange = np.bincount(label, window.foreign[row, column], count) / amount
+        return Blobs(slopes[kept], areas[kept], ~cut[kept], lean, strange[kept])
 
     def warm_up(self) -> None:
         """Load or compile the kernel, so that the first picture is not kept waiting."""
@@ -275,6 +304,24 @@ def row_radius(window: GroundWindow, rows: Array, spacing: float) -> float | Non
         mean = float((own * share) @ middle / (own @ share))
         sigma = float(np.sqrt((own * share) @ (middle - mean) ** 2 / (own @ share)) + 1e-4)
     return 2.0 * float(np.sqrt(max(sigma**2 - _SOWN**2, _SOWN**2 / 4.0)))
+
+
+def middle_of_rows(window: GroundWindow, rows: Array, spacing: float, radius: float) -> Mask:
+    """Some cells (rows, columns) that are grown over, well within the picture, in the middle of the crop's plants.
+
+    Args:
+        window: the ground.
+        rows: (6,) as `RowsOnGround.values`.
+        spacing: between rows, m.
+        radius: of a usual plant of the crop, m.
+    """
+    row, column = _SPARSE * np.stack(np.nonzero(window.cells[::_SPARSE, ::_SPARSE] == _GROWS))
+    places = window.corner + window.side * np.column_stack([row, column])
+    aside = lateral(places[:, 0], places[:, 1], rows)[0]
+    inside = np.abs(aside - spacing * np.round(aside / spacing)) < _MIDDLE * radius
+    middle = np.zeros(window.cells.shape, np.bool_)
+    middle[row[inside], column[inside]] = True
+    return middle
 
 
 def nearest_ground(camera: Camera, lean: Lean) -> float:

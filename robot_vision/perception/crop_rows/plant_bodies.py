@@ -20,6 +20,8 @@ _LEAST = 1.5e-4
 _CORE, _SOLID, _STANDS_OUT, _HEM = 0.3, 0.9, 0.02, 0.004
 #: The same in radii of a usual plant; the rest is at most this share of one.
 _OUT_SHARE, _MOST_BESIDE = 0.18, 0.15
+#: Share of a blob that must have another colour than the crop for all of it to be one plant.
+_ALL_FOREIGN = 0.5
 
 
 def bodies(cells: NDArray[np.uint8], radius: float) -> NDArray[np.intp]:
@@ -82,4 +84,34 @@ def cut_beside(
     names = count - 1 + np.cumsum(own)
     mine = own[part]
     labels[row[mine], column[mine]] = names[part[mine]]
+    return count + int(own.sum())
+
+
+def cut_foreign(foreign: NDArray[np.bool_], labels: NDArray[np.int32], count: int, least: float) -> int:
+    """Cut plants off others that they touch, or grow into, by their colour.
+
+    Args:
+        foreign: (H, W) cells in which what grows has another colour than the crop.
+        labels: (H, W) of the blobs, 0 where it is bare; changed in place.
+        count: of labels.
+        least: smaller ones are left alone, cells.
+
+    Returns:
+        How many labels there are now.
+    """
+    row, column = np.nonzero(foreign & (labels > 0))
+    if not len(row):
+        return count
+    label = labels[row, column]
+    share = np.bincount(label, minlength=count) / np.maximum(np.bincount(labels.ravel(), minlength=count), 1)
+    part = share[label] <= _ALL_FOREIGN
+    row, column = row[part], column[part]
+    beside = np.zeros(labels.shape, np.uint8)
+    beside[row, column] = 1
+    parts, of = cv2.connectedComponents(beside, connectivity=8, ltype=cv2.CV_32S)
+    which = np.asarray(of, np.intp)[row, column]
+    own = np.bincount(which, minlength=parts) >= least
+    names = count - 1 + np.cumsum(own)
+    mine = own[which]
+    labels[row[mine], column[mine]] = names[which[mine]]
     return count + int(own.sum())
