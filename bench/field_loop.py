@@ -25,6 +25,8 @@ FIELDS: dict[str, dict[str, Any]] = {
     "canopy": {"set": "canopy"},
 }
 RMS_MM, END_M = 15.0, 0.5
+SHORT_M = 1.0
+"""A drive that stops so long before the end of the rows has not gone through."""
 
 
 def run(quick: bool, seeds: Sequence[int] | None = None) -> list[Table]:
@@ -75,7 +77,16 @@ def _table(drives: dict[str, list[Told]], count: int) -> Table:
             at_most(0),
             0,
         ),
-        row("end of the rows, median error", "m", lambda told: np.median([*map(end_error, told)]), digits=2),
+        row(
+            "drives that stopped on the way",
+            "",
+            lambda told: sum(d.stopped and d.along[-1] < LENGTH_M - SHORT_M for d in told),
+            at_most(0),
+            0,
+        ),
+        row(
+            "end of the rows, median error", "m", lambda told: np.nanmedian([*map(end_error, told)]), digits=2
+        ),
         row(
             "end of the rows, greatest error", "m", lambda told: max(map(end_error, told)), at_most(END_M), 2
         ),

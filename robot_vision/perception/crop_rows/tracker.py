@@ -25,6 +25,7 @@ from robot_vision.perception.crop_rows.ground_fit import (
     pieces_of,
     tall_by_cover,
 )
+from robot_vision.perception.crop_rows.row_dispute import RowDispute
 from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, go_on_until, row_cover, sideways
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 from robot_vision.perception.crop_rows.sight import fault_of
@@ -85,6 +86,7 @@ class RowTracker:
         detector: that finds rows where nothing is known yet; its camera and spacing are of no account.
         fit: of the rows on the ground.
         row_filter: over time.
+        dispute: between the filter and pictures that it refuses.
         extent: of the rows along the way.
         coherence: least share of the vegetation that must stand in rows, 0 to 1.
         cover: least share of the ground that plants must cover.
@@ -98,6 +100,7 @@ class RowTracker:
     detector: CropRowDetector = field(default_factory=CropRowDetector)
     fit: GroundFit = field(default_factory=GroundFit)
     row_filter: RowFilter = field(default_factory=RowFilter)
+    dispute: RowDispute = field(default_factory=RowDispute)
     extent: RowExtent = field(default_factory=RowExtent)
     coherence: float = 0.12
     cover: float = 0.004
@@ -122,6 +125,7 @@ class RowTracker:
     def reset(self) -> None:
         """Forget everything earlier pictures told."""
         self.row_filter.reset()
+        self.dispute.settle()
         self.extent.reset()
         self._way = self._unseen = self._reach = 0.0
         self._refused = 0
@@ -143,6 +147,7 @@ class RowTracker:
                 "rows in metres need a calibrated camera and its height (parameter camera.height)"
             )
         self.row_filter.predict(motion)
+        self.dispute.predict(motion)
         self._blind = motion.speed is None
         self._way += (motion.speed or 0.0) * motion.seconds
         self._unseen += abs(motion.speed or 0.0) * motion.seconds
@@ -173,7 +178,7 @@ class RowTracker:
         rows = nearest_row(rows, expected)
         dissent = self._dissent(pieces, rows, camera)
         doubt = _DISSENT if dissent else 1.0
-        if not self.row_filter.update(rows.values[:3], rows.covariance[:3, :3], doubt):
+        if not self._believed(rows, doubt):
             if self.row_filter.knows:
                 self._look_along(pieces, camera, self._start(), self._spread(), motion)
             return self._without(dissent or "what stands in this picture does not go on from the rows before")
@@ -182,6 +187,18 @@ class RowTracker:
         self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, rows.covariance[:3, :3], motion)
         return RowEstimate(self._lane(), dissent, True, rows, self._end())
+
+    def _believed(self, rows: RowsOnGround, doubt: float) -> bool:
+        """Whether the filter, or the one that takes its place, has taken in the rows of a picture."""
+        told = rows.values[:3], rows.covariance[:3, :3], doubt
+        if self.row_filter.update(*told):
+            self.dispute.settle()
+            return True
+        if not self.row_filter.knows:
+            return False
+        better = self.dispute.refused(self.row_filter, *told, self.spacing)
+        self.row_filter = better or self.row_filter
+        return better is not None
 
     def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
         """What single plants (20.11)-(20.15) have against the rows fitted to all of them; empty when nothing."""

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures that a filter refuses get the word when they agree for long, and only about the filter's own row."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robot_vision.perception.crop_rows.row_dispute import RowDispute
+from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
+
+SIGMA = np.diag([0.012, 0.006, 0.001]) ** 2
+SPACING = 0.5
+#: So sure of itself and so wrong is a filter that began with a picture whose far rows were taken for their neighbours.
+WRONG = np.array([-0.05, 0.04, -0.02])
+
+
+def taken_over_after(true: np.ndarray, speed: float, pictures: int, seed: int = 0) -> float | None:
+    """Way, m, after which a filter that began wrong gives way to pictures of the true rows; None: it does not."""
+    random, step = np.random.default_rng(seed), Motion(0.1, speed, 0.0)
+    row_filter, dispute = RowFilter(), RowDispute()
+    row_filter.update(true * 0.0 + WRONG, SIGMA)
+    for number in range(pictures):
+        row_filter.predict(step)
+        dispute.predict(step)
+        measured = true + random.multivariate_normal(np.zeros(3), 0.2 * SIGMA)
+        if row_filter.update(measured, SIGMA):
+            dispute.settle()
+            continue
+        better = dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING)
+        if better is not None:
+            assert better.expected()[:2] == pytest.approx(true[:2], abs=0.02)
+            return (number + 1) * 0.1 * speed
+    return None
+
+
+def test_a_filter_that_began_wrong_gives_way_to_pictures_that_agree() -> None:
+    way = taken_over_after(np.array([0.03, 0.0, 0.02]), speed=1.6, pictures=40)
+    assert way is not None
+    assert way < 2.5
+
+
+def test_the_next_row_never_takes_over() -> None:
+    assert taken_over_after(np.array([-0.25, 0.0, 0.02]), speed=1.6, pictures=40) is None
+
+
+def test_the_same_plants_seen_again_and_again_prove_nothing() -> None:
+    assert taken_over_after(np.array([0.03, 0.0, 0.02]), speed=0.0, pictures=60) is None
+
+
+def test_pictures_that_contradict_each_other_prove_nothing() -> None:
+    row_filter, dispute, step = RowFilter(), RowDispute(), Motion(0.1, 1.6, 0.0)
+    row_filter.update(WRONG, SIGMA)
+    for number in range(40):
+        row_filter.predict(step)
+        dispute.predict(step)
+        measured = np.array([0.08, 0.1 if number % 2 else -0.1, 0.0])
+        assert not row_filter.update(measured, SIGMA)
+        assert dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING) is None
