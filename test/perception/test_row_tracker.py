@@ -66,6 +66,13 @@ def test_the_end_of_the_rows_is_told_and_a_gap_is_driven_through() -> None:
     assert abs(through[-1].lane.offset) < 0.03  # type: ignore[union-attr]
 
 
+def test_without_odometry_the_end_is_told_by_one_picture() -> None:
+    tracker = RowTracker(0.5)
+    for seed in range(2):
+        estimate = tracker.update(drawn(Sown(end=3.5), seed=seed), CAMERA, Motion(0.1 * seed))
+    assert estimate.end == pytest.approx(3.5, abs=0.5)
+
+
 def flared(picture: Picture) -> Picture:
     v, u = np.indices(picture.shape[:2])
     glare = 700.0 * np.exp(-((u - 320.0) ** 2 + (v - 150.0) ** 2) / 2.0 / 200.0**2)

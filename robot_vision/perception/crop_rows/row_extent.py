@@ -16,6 +16,8 @@ _CELLS, _BEHIND = 200, 60
 """Stretches remembered, and how many of them behind the robot."""
 _KNOWN = 2.0
 """A stretch that was looked at for less says nothing: the lean of a single picture may be wrong by metres far ahead."""
+ALONE = 8.0
+"""Factor on what a picture can tell that has to speak for itself."""
 _WEIGHTS = np.array([0.25, 0.5, 0.25])
 _OPEN = 0.15
 """Share of the usual cover that open ground has at most, all in all."""

@@ -26,7 +26,14 @@ from robot_vision.perception.crop_rows.ground_fit import (
     tall_by_cover,
 )
 from robot_vision.perception.crop_rows.row_dispute import RowDispute
-from robot_vision.perception.crop_rows.row_extent import CELL_M, RowExtent, go_on_until, row_cover, sideways
+from robot_vision.perception.crop_rows.row_extent import (
+    ALONE,
+    CELL_M,
+    RowExtent,
+    go_on_until,
+    row_cover,
+    sideways,
+)
 from robot_vision.perception.crop_rows.row_filter import Motion, RowFilter
 from robot_vision.perception.crop_rows.sight import fault_of
 from robot_vision.perception.crop_rows.single_plant import contradicting_heading
@@ -293,16 +300,17 @@ class RowTracker:
         self, pieces: Pieces, camera: Camera, values: Array, covariance: Array, motion: Motion
     ) -> None:
         """Note where along the way rows stand."""
-        if motion.speed is None:
-            self.extent.reset()  # without odometry nobody knows where the last picture was taken
+        alone = motion.speed is None  # without odometry nobody knows where the last picture was taken
+        if alone:
+            self.extent.reset()
         x, y = ground_places(pieces.rays, camera, values)
         aside, along = lateral(x, y, values)
         near, far = ground_in_view(camera, values)
         half = _SIDE_ROWS * self.spacing
-        stretch = row_cover(
+        ahead, cover, seen = row_cover(
             along, aside, pieces.weight, self.spacing, half, (near, min(far, 1.4 * self.fit.far)), covariance
         )
-        self.extent.see(self._way, *stretch)
+        self.extent.see(self._way, ahead, cover, ALONE * seen if alone else seen)
 
     def _lane(self) -> LaneHeading | None:
         state, covariance = self.row_filter.state, self.row_filter.covariance
