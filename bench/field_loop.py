@@ -88,7 +88,11 @@ def _table(drives: dict[str, list[Told]], count: int) -> Table:
             "end of the rows, median error", "m", lambda told: np.nanmedian([*map(end_error, told)]), digits=2
         ),
         row(
-            "end of the rows, greatest error", "m", lambda told: max(map(end_error, told)), at_most(END_M), 2
+            "end of the rows, greatest error",
+            "m",
+            lambda told: np.nanmax([*map(end_error, told)]),
+            at_most(END_M),
+            2,
         ),
     ]
     return Table(

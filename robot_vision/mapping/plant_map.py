@@ -134,6 +134,7 @@ class PlantMap:
         self.judge.reset()
         self.colour.reset()
         self._cover.reset()
+        self._closes = False
 
     def move(self, motion: Motion) -> None:
         """Go on by what the robot did; without a speed nobody knows where the plants are now.
@@ -240,7 +241,8 @@ class PlantMap:
         kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
         kinds[weed > self.sure] = PlantKind.WEED
         if self._closes:
-            kinds[large & (foreign < _FOREIGN)] = PlantKind.UNSURE
+            own = foreign < _FOREIGN
+            kinds[own & (large | (tracks.ages[known] < _SURE_AGE))] = PlantKind.UNSURE
         kinds[weed < 0.5] = PlantKind.CROP
         return Plants(
             tracks.ids[known],

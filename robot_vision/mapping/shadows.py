@@ -86,7 +86,7 @@ class ShadowFinder:
         return np.asarray(dim & (red - blue < self.warmth * mean))
 
     def find(self, bgr: Pixels, score: Scores, view: GroundView, parallax: Parallax | None) -> Mask:
-        """Which pixels (H, W) that do not look like floor are floor in shadow.
+        """Which pixels (H, W) that do not look like floor, or hardly do, are floor in shadow.
 
         Args:
             bgr: (H, W, 3) the part of the picture that shows ground.
@@ -118,7 +118,7 @@ class ShadowFinder:
             beside = np.asarray(cv2.dilate(stands.astype(np.uint8), np.ones((3, 3), np.uint8)), np.bool_)
             joined = np.bincount(patches[beside], minlength=count) > 0
             # What hangs together with a thing that stands, as its skirting does, must look like shadow both ways.
-            flat = np.where(np.isnan(lies), flat, (lies > self.lying) & (flat | ~joined))
+            flat = np.where(np.isnan(lies), flat & ~joined, (lies > self.lying) & (flat | ~joined))
         flat[0] = False
         return np.asarray(flat[patches])
 

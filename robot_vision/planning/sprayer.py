@@ -156,21 +156,27 @@ class SprayPlanner:
         reach = plants.radii + np.maximum(self.safety, _CAUTION * unsure)
         crop = plants.kinds != PlantKind.WEED
         places, reach = plants.places[crop], reach[crop]
-        if leaves is not None:
-            covered = _beside(leaves, plants.places[weeds], plants.radii[weeds])
-            places = np.concatenate([places, covered])
-            reach = np.concatenate([reach, np.full(len(covered), self.safety + 0.5 * CELL_M)])
+        behind, before = self._kept_off(plants.places[weeds], places, reach)
+        if leaves is not None and len(leaves):
+            covered = _not_their_own(leaves, plants.places[weeds], plants.radii[weeds])
+            for k, weed in enumerate(weeds):
+                place = plants.places[[weed]]
+                near = covered[_square(covered, place[0]) < (plants.radii[weed] + _ASIDE) ** 2]
+                back, front = self._kept_off(place, near, np.full(len(near), self.safety + 0.5 * CELL_M))
+                behind[k], before[k] = np.maximum(behind[k], back[0]), np.minimum(before[k], front[0])
+        return np.maximum(-half, behind), np.minimum(half, before)
+
+    def _kept_off(self, weeds: Array, places: Array, reach: Array) -> tuple[Array, Array]:
+        """The way about weeds (M, 2) farther than (N,) from places (N, 2) in each lane: (M, lanes) each, m."""
         wide = np.abs(places[:, 1]) < 0.5 * self.lanes * self.width + reach
         places, reach = places[wide], reach[wide]
-        if not len(places) or not len(weeds):
-            return -half, half
         aside = np.abs(places[:, 1, None] - self.middles[None, :]) - 0.5 * self.width
         near = aside < reach[:, None]
         chord = np.sqrt(np.maximum(reach[:, None] ** 2 - np.maximum(aside, 0.0) ** 2, 0.0))
-        away = (places[None, :, 0] - plants.places[weeds, None, 0])[:, :, None]
-        behind = np.where(near & (away < 0.0), away + chord, -np.inf).max(axis=1)
-        before = np.where(near & (away >= 0.0), away - chord, np.inf).min(axis=1)
-        return np.maximum(-half, behind), np.minimum(half, before)
+        away = (places[None, :, 0] - weeds[:, None, 0])[:, :, None]
+        behind = np.where(near & (away < 0.0), away + chord, -np.inf).max(axis=1, initial=-np.inf)
+        before = np.where(near & (away >= 0.0), away - chord, np.inf).min(axis=1, initial=np.inf)
+        return np.asarray(behind), np.asarray(before)
 
     def _count(self, plants: Plants, sprayed: NDArray[np.bool_], spared: NDArray[np.bool_]) -> None:
         """Note what becomes of plants ahead, and count those that the boom has passed since the last picture."""
@@ -190,13 +196,17 @@ class SprayPlanner:
         }
 
 
-def _beside(leaves: Array, weeds: Array, radii: Array) -> Array:
-    """Those of the leaves (L, 2) near weeds (M, 2) of such radii (M,) that are not their own."""
-    square = np.zeros((len(leaves), len(weeds)))
-    for axis in range(2):
-        square += (leaves[:, None, axis] - weeds[None, :, axis]) ** 2
-    near = (square < (radii + _ASIDE) ** 2).any(axis=1)
-    return np.asarray(leaves[near & (square > (radii + _OWN) ** 2).all(axis=1)])
+def _not_their_own(leaves: Array, weeds: Array, radii: Array) -> Array:
+    """Those of the leaves (L, 2) that lie outside weeds (M, 2) of such radii (M,)."""
+    crop = np.ones(len(leaves), np.bool_)
+    for weed, radius in zip(weeds, radii, strict=True):
+        crop &= _square(leaves, weed) > (radius + _OWN) ** 2
+    return leaves[crop]
+
+
+def _square(places: Array, place: Array) -> Array:
+    """Squared distances (N,) of places (N, 2) from one (2,), m^2."""
+    return np.asarray((places[:, 0] - place[0]) ** 2 + (places[:, 1] - place[1]) ** 2)
 
 
 def _marked(plants: Plants, which: NDArray[np.intp]) -> NDArray[np.bool_]:

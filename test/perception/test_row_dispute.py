@@ -15,11 +15,11 @@ SPACING = 0.5
 WRONG = np.array([-0.05, 0.04, -0.02])
 
 
-def taken_over_after(true: np.ndarray, speed: float, pictures: int, seed: int = 0) -> float | None:
+def taken_over_after(true: np.ndarray, speed: float, pictures: int) -> float | None:
     """Way, m, after which a filter that began wrong gives way to pictures of the true rows; None: it does not."""
-    random, step = np.random.default_rng(seed), Motion(0.1, speed, 0.0)
+    random, step = np.random.default_rng(0), Motion(0.1, speed, 0.0)
     row_filter, dispute = RowFilter(), RowDispute()
-    row_filter.update(true * 0.0 + WRONG, SIGMA)
+    row_filter.update(WRONG, SIGMA)
     for number in range(pictures):
         row_filter.predict(step)
         dispute.predict(step)
@@ -57,3 +57,20 @@ def test_pictures_that_contradict_each_other_prove_nothing() -> None:
         measured = np.array([0.08, 0.1 if number % 2 else -0.1, 0.0])
         assert not row_filter.update(measured, SIGMA)
         assert dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING) is None
+
+
+def test_two_pictures_with_a_gap_between_prove_nothing() -> None:
+    row_filter, dispute = RowFilter(), RowDispute()
+    row_filter.update(WRONG, SIGMA)
+    measured = np.array([0.06, 0.0, 0.02])
+    for seconds in (0.1, 1.5):
+        step = Motion(seconds, 1.6, 0.0)
+        row_filter.predict(step)
+        dispute.predict(step)
+        assert dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING) is None
+
+
+@pytest.mark.parametrize("name", ["agreed", "pictures", "aside"])
+def test_settings_without_meaning_are_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        RowDispute(**{name: 0})

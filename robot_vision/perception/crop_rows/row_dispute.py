@@ -12,6 +12,9 @@ from robot_vision.perception.crop_rows.row_filter import OFFSET, Motion, RowFilt
 
 Array = NDArray[np.float64]
 
+_STEP_M = 0.5
+"""Way from one picture that agrees to the next that counts at most."""
+
 
 @dataclass
 class RowDispute:
@@ -22,23 +25,36 @@ class RowDispute:
 
     Args:
         agreed: way over which they must, m: by then other plants are seen than at its beginning.
+        pictures: so many must, at least.
         aside: share of the spacing by which their row may lie beside the filter's: farther off is another row.
+
+    Raises:
+        ValueError: naming the setting that is no positive number.
     """
 
     agreed: float = 1.2
+    pictures: int = 5
     aside: float = 0.25
     _rival: RowFilter | None = field(default=None, init=False, repr=False, compare=False)
     _way: float = field(default=0.0, init=False, repr=False, compare=False)
+    _since: float = field(default=0.0, init=False, repr=False, compare=False)
+    _count: int = field(default=0, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("agreed", "pictures", "aside"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ValueError(f"{name} must be a positive number, not {getattr(self, name)}")
 
     def predict(self, motion: Motion) -> None:
         """Carry the refused on, as the filter does."""
         if self._rival is not None:
             self._rival.predict(motion)
-            self._way += abs(motion.speed or 0.0) * motion.seconds
+            self._since += (motion.speed or 0.0) * motion.seconds
 
     def settle(self) -> None:
         """The filter has believed a picture: there is no dispute."""
-        self._rival, self._way = None, 0.0
+        self._rival = None
+        self._restart()
 
     def refused(
         self, row_filter: RowFilter, measured: Array, covariance: Array, doubt: float, spacing: float
@@ -54,11 +70,20 @@ class RowDispute:
         """
         rival = self._rival
         if rival is None or not rival.update(measured, covariance, doubt):
-            rival, self._way = replace(row_filter), 0.0
+            rival = replace(row_filter)
             self._rival = rival if rival.update(measured, covariance, doubt) else None
+            self._restart()
             return None
+        # Way without a picture that agrees, as across a gap, is none over which they have agreed
+        self._way += min(self._since, _STEP_M)
+        self._since = 0.0
+        self._count += 1
         off = abs(float(rival.expected()[OFFSET] - row_filter.expected()[OFFSET]))
-        if self._way < self.agreed or off > self.aside * spacing:
+        if self._way < self.agreed or self._count < self.pictures or off > self.aside * spacing:
             return None
         self.settle()
+        rival.bend = row_filter.bend  # may have been set since
         return rival
+
+    def _restart(self) -> None:
+        self._way, self._since, self._count = 0.0, 0.0, 0

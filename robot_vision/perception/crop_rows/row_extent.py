@@ -31,6 +31,8 @@ _NEAR_M, _ENOUGH = 3.0, 6
 """Ground before the robot, and stretches of it, that tell what is usual."""
 _FARTHEST = 0.15
 """A stretch seen from nearer counts for more; the farthest ones for this much."""
+_IN_ROWS = 0.35
+"""Share of what grows that must stand in rows for these to be believed to lie aside: weeds lie somewhere, too."""
 _SIGMAS = 3.0
 """Rows may lie so many standard deviations beside where they are known to."""
 _ANYWHERE = np.diag([1e3, 0.0, 0.0])
@@ -198,8 +200,10 @@ def row_cover(
     most = np.minimum(2.0 * np.pi * _SIGMAS * sideways(middles, covariance) / spacing, np.pi)
     if len(middles):
         about = np.ones(min(_ABOUT, len(middles)))
-        seen = np.arctan2(np.convolve(imaginary, about, "same"), np.convolve(real, about, "same"))
-        lies = np.clip(seen, -most, most)
+        grown, _ = np.histogram(place, edges, weights=area[inside])
+        across, along, total = (np.convolve(part, about, "same") for part in (imaginary, real, grown))
+        in_rows = np.hypot(across, along) > _IN_ROWS * total
+        lies = np.where(in_rows, np.clip(np.arctan2(across, along), -most, most), 0.0)
         real = real * np.cos(lies) + imaginary * np.sin(lies)
     weight = np.clip(1.5 - middles / far, _FARTHEST, 1.0)
     return middles, real / (2.0 * half_width * CELL_M), weight
@@ -219,8 +223,7 @@ def go_on_until(
     if not len(ahead):
         return within[1]
     cover = np.convolve(cover, _WEIGHTS, "same")
-    near = cover[ahead < ahead[0] + _NEAR_M]
-    stands = cover > _THIN * max(float(np.quantile(near, 0.85)), 1e-3)
+    stands = cover > _THIN * max(float(np.quantile(cover, 0.85)), 1e-3)
     if not stands.any():
         return within[1]
     since = np.arange(len(ahead)) - np.maximum.accumulate(np.where(stands, np.arange(len(ahead)), -1))

@@ -115,6 +115,7 @@ class RowTracker:
     _refused: int = field(default=0, init=False, repr=False, compare=False)
     _unseen: float = field(default=0.0, init=False, repr=False, compare=False)
     _blind: bool = field(default=False, init=False, repr=False, compare=False)
+    _alone: bool = field(default=False, init=False, repr=False, compare=False)
     _reach: float = field(default=0.0, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -204,8 +205,11 @@ class RowTracker:
         if not self.row_filter.knows:
             return False
         better = self.dispute.refused(self.row_filter, *told, self.spacing)
-        self.row_filter = better or self.row_filter
-        return better is not None
+        if better is None:
+            return False
+        self.row_filter = better
+        self.extent.reset()  # what was noted along the way was noted at the wrong place
+        return True
 
     def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
         """What single plants (20.11)-(20.15) have against the rows fitted to all of them; empty when nothing."""
@@ -300,9 +304,11 @@ class RowTracker:
         self, pieces: Pieces, camera: Camera, values: Array, covariance: Array, motion: Motion
     ) -> None:
         """Note where along the way rows stand."""
-        alone = motion.speed is None  # without odometry nobody knows where the last picture was taken
-        if alone:
+        # Without odometry nobody knows where the last picture was taken
+        alone = motion.speed is None and motion.seconds > 0.0
+        if alone or self._alone:
             self.extent.reset()
+        self._alone = alone
         x, y = ground_places(pieces.rays, camera, values)
         aside, along = lateral(x, y, values)
         near, far = ground_in_view(camera, values)
@@ -330,7 +336,7 @@ class RowTracker:
         if not self.row_filter.knows:
             return RowEstimate(None, reason, False, None, None)
         self._refused += 1
-        end = self.extent.end(self._way)
+        end = self._end()
         lane = self._lane()
         lost = self._unseen > self.extent.gap or (self._blind and self._refused > _MOST_REFUSED)
         if lane is None or lost:
