@@ -21,7 +21,8 @@ def leaves(end: float, reach: float, dense: float = 0.2) -> NDArray[np.float64]:
 
 def seen(cover: NDArray[np.float64]) -> RowExtent:
     extent = RowExtent()
-    extent.see(0.0, AHEAD, cover, np.ones(len(AHEAD)))
+    for _ in range(3):  # pictures, as one alone tells no end
+        extent.see(0.0, AHEAD, cover, np.ones(len(AHEAD)))
     return extent
 
 
