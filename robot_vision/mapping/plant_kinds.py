@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.perception.crop_rows.ground_fit import lateral
+from robot_vision.perception.crop_rows.plant_bodies import FOREIGN
 from robot_vision.perception.lane import LaneHeading
 
 Array = NDArray[np.float64]
@@ -40,9 +41,8 @@ _SELDOM, _SIDE_ROWS = 4, 2
 _FEWEST = 3.0
 #: Row, grid and size say at most so much (logarithm of a ratio): a plant that was cut wrongly is out of every grid.
 _MOST, _MOST_GRID, _MOST_AREA, _MOST_COLOUR = 6.0, 4.0, 4.0, 4.0
-#: A plant is foreign when so much of it has another colour than the crop; so many plants of each kind are taken to be,
-#: and not to be, before any is seen.
-_FOREIGN, _DOUBT = 0.5, 0.5
+#: So many plants of each kind are taken to be foreign, and not to be, before any is seen.
+_DOUBT = 0.5
 #: Standard deviation of the logarithm of the area of a kind: least and most.
 _ALIKE = 0.3, 0.8
 _TAU = 2.0 * np.pi
@@ -176,7 +176,7 @@ class PlantJudge:
         if self._learned[:, 3].min() < 5.0 or self._learned[:, 4].max() < 1.0:
             return np.zeros(len(foreign))
         shares = (self._learned[:, 4] + _DOUBT) / (self._learned[:, 3] + 2.0 * _DOUBT)
-        crop, weed = np.where(foreign[:, None] >= _FOREIGN, shares, 1.0 - shares).T
+        crop, weed = np.where(foreign[:, None] >= FOREIGN, shares, 1.0 - shares).T
         return _ratio(weed, crop, _MOST_COLOUR)
 
     def _learn(self, plants: InRow, ratio: Array, spacing: float) -> None:
@@ -190,7 +190,7 @@ class PlantJudge:
                     sure @ plants.log_areas,
                     sure @ plants.log_areas**2,
                     sure.sum(),
-                    sure @ (plants.foreign >= _FOREIGN),
+                    sure @ (plants.foreign >= FOREIGN),
                 ]
             )
             self._learned[kind] = _FADES * self._learned[kind] + (1.0 - _FADES) * own

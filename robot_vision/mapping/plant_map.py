@@ -30,6 +30,7 @@ from robot_vision.perception.crop_rows.plant_blobs import (
     middle_of_rows,
     row_radius,
 )
+from robot_vision.perception.crop_rows.plant_bodies import FOREIGN
 from robot_vision.perception.crop_rows.plant_colours import CropColour
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.tracker import RowEstimate
@@ -52,8 +53,6 @@ _SLOWLY = 0.1
 _AS_LARGE = 0.15
 #: Least and greatest height of the middle of a plant of the crop, in radii.
 _STATURES = 0.25, 1.2
-#: Plants of which so much has another colour than the crop are none of it.
-_FOREIGN = 0.5
 #: New plants keep so many radii from known ones.
 _OWN_GROUND = 0.5
 
@@ -221,7 +220,7 @@ class PlantMap:
         tracks = self.tracks
         known = tracks.ages >= (1 if self._blind else KNOWN_AGE)
         if self._closes and not self._blind:
-            known &= (tracks.ages >= _SURE_AGE) | (tracks.foreign >= _FOREIGN)
+            known &= (tracks.ages >= _SURE_AGE) | (tracks.foreign >= FOREIGN)
         cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
         to_base = np.array([[cosine, sine], [-sine, cosine]])
         field_places = tracks.states[known, :2]
@@ -241,7 +240,7 @@ class PlantMap:
         kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
         kinds[weed > self.sure] = PlantKind.WEED
         if self._closes:
-            own = foreign < _FOREIGN
+            own = foreign < FOREIGN
             kinds[own & (large | (tracks.ages[known] < _SURE_AGE))] = PlantKind.UNSURE
         kinds[weed < 0.5] = PlantKind.CROP
         return Plants(
@@ -260,7 +259,7 @@ class PlantMap:
         """Match the plants of a window with those that are known, and correct these."""
         assert camera.height_m is not None
         self._height = camera.height_m
-        alike = (self.tracks.ages >= KNOWN_AGE) & (self.tracks.foreign < _FOREIGN)
+        alike = (self.tracks.ages >= KNOWN_AGE) & (self.tracks.foreign < FOREIGN)
         known = self.tracks.seen_from(self.pose, camera.x_m)[0][alike]
         places = known * (window.fall / camera.height_m) + (camera.x_m, 0.0)
         blobs = self.segmenter.cut(window, camera, lean, self.radius, places)
@@ -343,8 +342,8 @@ class PlantMap:
             expected, _ = self.tracks.seen_from(self.pose, camera.x_m)
             radius = np.sqrt(np.exp(self.tracks.log_areas) / np.pi)
             away = np.linalg.norm(seen[new][:, None, :] - expected[None, :, :], axis=2)
-            strange = blobs.foreign[new] >= _FOREIGN
-            alike = ~strange[:, None] | (self.tracks.foreign >= _FOREIGN)
+            strange = blobs.foreign[new] >= FOREIGN
+            alike = ~strange[:, None] | (self.tracks.foreign >= FOREIGN)
             new[np.flatnonzero(new)[((away < _OWN_GROUND * radius) & alike).any(axis=1)]] = False
         count = int(new.sum())
         if count:

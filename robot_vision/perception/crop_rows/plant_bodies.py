@@ -20,8 +20,8 @@ _LEAST = 1.5e-4
 _CORE, _SOLID, _STANDS_OUT, _HEM = 0.3, 0.9, 0.02, 0.004
 #: The same in radii of a usual plant; the rest is at most this share of one.
 _OUT_SHARE, _MOST_BESIDE = 0.18, 0.15
-#: Share of a blob that must have another colour than the crop for all of it to be one plant.
-_ALL_FOREIGN = 0.5
+#: A plant, or a blob, of which so much has another colour than the crop is none of it.
+FOREIGN = 0.5
 
 
 def bodies(cells: NDArray[np.uint8], radius: float) -> NDArray[np.intp]:
@@ -104,7 +104,7 @@ def cut_foreign(foreign: NDArray[np.bool_], labels: NDArray[np.int32], count: in
         return count
     label = labels[row, column]
     share = np.bincount(label, minlength=count) / np.maximum(np.bincount(labels.ravel(), minlength=count), 1)
-    part = share[label] <= _ALL_FOREIGN
+    part = share[label] <= FOREIGN
     row, column = row[part], column[part]
     beside = np.zeros(labels.shape, np.uint8)
     beside[row, column] = 1

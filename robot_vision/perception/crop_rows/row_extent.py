@@ -29,8 +29,6 @@ _LEAST_DENSE = 0.5
 """Rows are sown at least so densely, as a share of the usual cover."""
 _NEAR_M, _ENOUGH = 3.0, 6
 """Ground before the robot, and stretches of it, that tell what is usual."""
-_FARTHEST = 0.15
-"""A stretch seen from nearer counts for more; the farthest ones for this much."""
 _IN_ROWS = 0.35
 """Share of what grows that must stand in rows for these to be believed to lie aside: weeds lie somewhere, too."""
 _SIGMAS = 3.0
@@ -205,7 +203,7 @@ def row_cover(
         in_rows = np.hypot(across, along) > _IN_ROWS * total
         lies = np.where(in_rows, np.clip(np.arctan2(across, along), -most, most), 0.0)
         real = real * np.cos(lies) + imaginary * np.sin(lies)
-    weight = np.clip(1.5 - middles / far, _FARTHEST, 1.0)
+    weight = np.minimum(1.5 - middles / far, 1.0)  # a stretch seen from nearer counts for more
     return middles, real / (2.0 * half_width * CELL_M), weight
 
 

@@ -179,22 +179,25 @@ class RowTracker:
             told = self._where_rows_stand(told, camera)
         rows, fault = self._fitted(picture, told, covered, camera)
         if rows is None:
-            if self.row_filter.knows:
-                self._look_along(pieces, camera, self._start(), self._spread(), motion)
-            return self._without(fault)
+            return self._refuse(pieces, camera, motion, fault)
         expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
         rows = nearest_row(rows, expected)
         dissent = self._dissent(pieces, rows, camera)
         doubt = _DISSENT if dissent else 1.0
         if not self._believed(rows, doubt):
-            if self.row_filter.knows:
-                self._look_along(pieces, camera, self._start(), self._spread(), motion)
-            return self._without(dissent or "what stands in this picture does not go on from the rows before")
+            why = dissent or "what stands in this picture does not go on from the rows before"
+            return self._refuse(pieces, camera, motion, why)
         rows = replace(rows, covariance=doubt * rows.covariance)
         self._refused = 0
         self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, rows.covariance[:3, :3], motion)
         return RowEstimate(self._lane(), dissent, True, rows, self._end())
+
+    def _refuse(self, pieces: Pieces, camera: Camera, motion: Motion, reason: str) -> RowEstimate:
+        """The answer to a picture not believed: what stands along the way is noted where rows should be."""
+        if self.row_filter.knows:
+            self._look_along(pieces, camera, self._start(), self._spread(), motion)
+        return self._without(reason)
 
     def _believed(self, rows: RowsOnGround, doubt: float) -> bool:
         """Whether the filter, or the one that takes its place, has taken in the rows of a picture."""
@@ -290,11 +293,9 @@ class RowTracker:
 
     def _tied(self, pieces: Pieces, camera: Camera, start: Array) -> Pieces:
         """Leave out rows beyond open ground while it is not sure which of them goes on as which of those before it."""
-        x, y = ground_places(pieces.rays, camera, start)
-        aside, along = lateral(x, y, start)
-        near, far = ground_in_view(camera, start)
-        half, far = _SIDE_ROWS * self.spacing, min(far, 1.4 * self.fit.far)
-        until = go_on_until(along, aside, pieces.weight, self.spacing, half, (near, far))
+        along, aside = self._among_rows(pieces, camera, start)
+        half, within = _SIDE_ROWS * self.spacing, self._strip(camera, start)
+        until = go_on_until(along, aside, pieces.weight, self.spacing, half, within)
         here = along < until
         if self.row_filter.knows:
             here |= sideways(along, self._spread()) < _TIED * self.spacing
@@ -309,14 +310,20 @@ class RowTracker:
         if alone or self._alone:
             self.extent.reset()
         self._alone = alone
-        x, y = ground_places(pieces.rays, camera, values)
-        aside, along = lateral(x, y, values)
-        near, far = ground_in_view(camera, values)
-        half = _SIDE_ROWS * self.spacing
-        ahead, cover, seen = row_cover(
-            along, aside, pieces.weight, self.spacing, half, (near, min(far, 1.4 * self.fit.far)), covariance
-        )
+        along, aside = self._among_rows(pieces, camera, values)
+        half, within = _SIDE_ROWS * self.spacing, self._strip(camera, values)
+        ahead, cover, seen = row_cover(along, aside, pieces.weight, self.spacing, half, within, covariance)
         self.extent.see(self._way, ahead, cover, ALONE * seen if alone else seen)
+
+    def _among_rows(self, pieces: Pieces, camera: Camera, values: Array) -> tuple[Array, Array]:
+        """Where bits stand along the robot's row, and how far to the left of it, (N,) each, m."""
+        aside, along = lateral(*ground_places(pieces.rays, camera, values), values)
+        return along, aside
+
+    def _strip(self, camera: Camera, values: Array) -> tuple[float, float]:
+        """Where the ground begins and ends that tells how rows go on, m ahead."""
+        near, far = ground_in_view(camera, values)
+        return near, min(far, 1.4 * self.fit.far)
 
     def _lane(self) -> LaneHeading | None:
         state, covariance = self.row_filter.state, self.row_filter.covariance
