@@ -34,6 +34,7 @@ class ShadowFinder:
         longest: length on the floor of a patch as a multiple of its width beyond which it stands up, as long as
             parallax does not tell.
         lying: share of what floor shows by parallax that a patch must show to be floor.
+        surely: likewise of a patch that hangs together with what stands and has not the look of a shadow.
         doubt: score below which a pixel may be in shadow: of floor that looks much like what it is in the light, shadow
             makes floor that is doubted.
         stands: log ratio of parallax from which on a pixel stands above the floor.
@@ -47,6 +48,7 @@ class ShadowFinder:
     warmth: float = 0.04
     longest: float = 2.0
     lying: float = 0.1
+    surely: float = 0.45
     doubt: float = 0.2
     stands: float = 0.3
     surrounded: float = 0.5
@@ -117,8 +119,10 @@ class ShadowFinder:
             lies = self._lies(patches, count, parallax)
             beside = np.asarray(cv2.dilate(stands.astype(np.uint8), np.ones((3, 3), np.uint8)), np.bool_)
             joined = np.bincount(patches[beside], minlength=count) > 0
-            # What hangs together with a thing that stands, as its skirting does, must look like shadow both ways.
-            flat = np.where(np.isnan(lies), flat & ~joined, (lies > self.lying) & (flat | ~joined))
+            # What hangs together with a thing that stands, as its skirting does, must look like shadow both ways,
+            # or lie beyond doubt, as the long shadow of a kerb does.
+            lying = np.where(joined & ~flat, self.surely, self.lying)
+            flat = np.where(np.isnan(lies), flat & ~joined, lies > lying)
         flat[0] = False
         return np.asarray(flat[patches])
 

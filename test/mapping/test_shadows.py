@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from corridor_pictures import CAMERA
 from numpy.typing import NDArray
 
@@ -49,3 +50,13 @@ def test_a_plain_part_of_what_stands_is_no_shadow() -> None:
 def test_floor_that_shadow_makes_doubtful_is_floor() -> None:
     shadow = found([SHADOW], np.zeros(SHAPE), np.zeros(SHAPE), like_floor=0.1)
     assert shadow[SHADOW].all()
+
+
+@pytest.mark.parametrize(("shown", "is_shadow"), [(-0.3, True), (-0.1, False)])
+def test_a_strip_beside_what_stands_is_shadow_when_it_surely_lies(shown: float, is_shadow: bool) -> None:
+    """As the shadow of a kerb, which runs on along it for longer than things on the floor are deep."""
+    raised, telling = np.zeros(SHAPE), np.full(SHAPE, 0.5)
+    strip = np.s_[10:60, 80:84]
+    raised[POST], raised[strip] = 0.8, shown
+    shadow = found([POST, strip], raised, telling)
+    assert shadow[strip].any() == is_shadow
