@@ -34,7 +34,8 @@ class ShadowFinder:
         longest: length on the floor of a patch as a multiple of its width beyond which it stands up, as long as
             parallax does not tell.
         lying: share of what floor shows by parallax that a patch must show to be floor.
-        surely: likewise of a patch that hangs together with what stands and has not the look of a shadow.
+        surely: likewise of the upper rim of a patch that hangs together with what stands and has not the look of a
+            shadow.
         doubt: score below which a pixel may be in shadow: of floor that looks much like what it is in the light, shadow
             makes floor that is doubted.
         stands: log ratio of parallax from which on a pixel stands above the floor.
@@ -48,7 +49,7 @@ class ShadowFinder:
     warmth: float = 0.04
     longest: float = 2.0
     lying: float = 0.1
-    surely: float = 0.45
+    surely: float = 0.42
     doubt: float = 0.2
     stands: float = 0.3
     surrounded: float = 0.5
@@ -120,9 +121,10 @@ class ShadowFinder:
             beside = np.asarray(cv2.dilate(stands.astype(np.uint8), np.ones((3, 3), np.uint8)), np.bool_)
             joined = np.bincount(patches[beside], minlength=count) > 0
             # What hangs together with a thing that stands, as its skirting does, must look like shadow both ways,
-            # or lie beyond doubt, as the long shadow of a kerb does.
-            lying = np.where(joined & ~flat, self.surely, self.lying)
-            flat = np.where(np.isnan(lies), flat & ~joined, lies > lying)
+            # or surely lie up to their upper rim, as the long shadow of a kerb does: what stands rises with its height.
+            up_high = self._lies(np.where(_upper_rim(patches), patches, 0), count, parallax) > self.surely
+            told = np.where(joined & ~flat, up_high, lies > self.lying)
+            flat = np.where(np.isnan(lies), flat & ~joined, told)
         flat[0] = False
         return np.asarray(flat[patches])
 
@@ -146,3 +148,10 @@ class ShadowFinder:
         )
         size = np.maximum(np.bincount(patches.ravel(), minlength=count), 1)
         return np.where(telling / size > _TELLING, -raised / np.maximum(telling, 1e-6), np.nan)
+
+
+def _upper_rim(patches: NDArray[np.int32]) -> Mask:
+    """The upper two rows of patches (H, W), column by column."""
+    rim = patches > 0
+    rim[2:] &= patches[:-2] != patches[2:]
+    return rim
