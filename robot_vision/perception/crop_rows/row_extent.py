@@ -25,6 +25,8 @@ _TAIL = 3
 """So many stretches of open ground may still hold the last plants of rows."""
 _LAST, _BEFORE = 4, 8
 """Stretches that make up the last metre of rows, and those before it that tell how densely it is sown."""
+_GROWN = 0.2
+"""Share of the usual cover from which on a stretch is grown over, be it by small plants."""
 _LEAST_DENSE = 0.5
 """Rows are sown at least so densely, as a share of the usual cover."""
 _NEAR_M, _ENOUGH = 3.0, 6
@@ -136,8 +138,10 @@ class RowExtent:
     def _sown_until(self, leaves_until: int, known: NDArray[np.bool_], usual: float) -> float:
         """Where the stems end, in stretches, when the last leaves end before stretch `leaves_until`.
 
-        Leaves reach beyond the last stems, and tall ones are seen farther off than they are: the last metre of rows
-        is as long as what grows there, were it to stand as densely as in the metres before.
+        Two answers whose errors go opposite ways: the last metre of rows is as long as what grows there, were it to
+        stand as densely as in the metres before, which is too short where the last plants are small; and rows end
+        with the last stretch that is grown over at all, which is too long as leaves reach beyond the last stems and
+        tall ones are seen farther off than they are.
         """
         cover = self._cover / np.maximum(self._seen, 1e-9)
         begin = max(leaves_until - _LAST, 0)
@@ -146,7 +150,10 @@ class RowExtent:
         if known[before].sum() >= _BEFORE // 2:
             dense = max(float(cover[before][known[before]].mean()), _LEAST_DENSE * usual)
         stretches = np.minimum(cover[begin : leaves_until + 1] / dense, 1.0)
-        return begin + float(np.clip(stretches.sum(), 0.0, leaves_until - begin))
+        as_long = begin + float(np.clip(stretches.sum(), 0.0, leaves_until - begin))
+        after = slice(leaves_until, leaves_until + _TAIL)
+        grown = np.flatnonzero(known[after] & (cover[after] > _GROWN * usual))
+        return 0.5 * (as_long + leaves_until + (int(grown[-1]) + 1 if len(grown) else 0))
 
     def _mean_cover(self, known: NDArray[np.bool_]) -> Array:
         """Cover of each stretch: neighbours together, as single plants are missing everywhere."""
