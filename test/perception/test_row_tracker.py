@@ -66,6 +66,20 @@ def test_the_end_of_the_rows_is_told_and_a_gap_is_driven_through() -> None:
     assert abs(through[-1].lane.offset) < 0.03  # type: ignore[union-attr]
 
 
+def test_rows_that_lie_elsewhere_are_refused_at_first_and_believed_once_they_go_on_so() -> None:
+    tracker = RowTracker(0.5)
+    began = along(tracker, Sown(offset=-0.09), 5)[-1].lane
+    later = along(tracker, Sown(offset=0.0), 16, seed=50)
+    assert began is not None
+    assert began.offset == pytest.approx(-0.09, abs=0.02)
+    assert not later[0].seen
+    assert later[0].lane is not None  # carried on, as one picture may be wrong
+    assert later[0].lane.offset == pytest.approx(-0.09, abs=0.03)
+    assert later[-1].seen
+    assert later[-1].lane is not None
+    assert later[-1].lane.offset == pytest.approx(0.0, abs=0.015)
+
+
 def test_without_odometry_the_end_is_told_by_one_picture() -> None:
     tracker = RowTracker(0.5)
     for seed in range(2):
