@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from corridor_lines import CAMERA as INDOORS
 from corridor_lines import Corridor, seen_lines
-from winding_road import CAMERA, Bends, seen_road
+from winding_road import CAMERA, WIDTH_M, Bends, seen_road
 
 from robot_vision.bags import BagReader, decode
 from robot_vision.bags.messages import stamp_ns
@@ -42,10 +42,12 @@ def on_a_road(estimator: WayEstimator, pictures: int, first: int = 0) -> list[Wa
     return found
 
 
-def in_a_corridor(estimator: WayEstimator, pictures: int, first: int = 0) -> list[WayEstimate]:
-    random = np.random.default_rng(first)
+def in_a_corridor(
+    estimator: WayEstimator, pictures: int, first: int = 0, width: float = 2.0
+) -> list[WayEstimate]:
+    random, corridor = np.random.default_rng(first), Corridor(width=width, doors=1.3)
     return [
-        estimator.update(seen_lines(Corridor(doors=1.3), 0.2, 0.05, random), INDOORS, picture / RATE)
+        estimator.update(seen_lines(corridor, 0.2, 0.05, random), INDOORS, picture / RATE)
         for picture in range(first, first + pictures)
     ]
 
@@ -67,6 +69,13 @@ def test_the_kind_changes_only_once_it_is_sure() -> None:
     frames = [answer.frame for answer in in_a_corridor(estimator, 30, first=51)]
     assert "corridor" not in frames[:RATE]
     assert frames[-1] == "corridor"
+
+
+def test_a_road_as_wide_as_the_corridor_before_it_is_a_road() -> None:
+    estimator = WayEstimator()
+    assert in_a_corridor(estimator, 8, width=WIDTH_M)[-1].frame == "corridor"
+    frames = [answer.frame for answer in on_a_road(estimator, 75, first=8)]
+    assert frames[-1] == "road", frames
 
 
 def test_the_end_of_a_corridor_is_no_road() -> None:
