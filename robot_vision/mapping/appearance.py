@@ -97,6 +97,7 @@ def _histogram(lab: Pixels) -> Scores:
     # One below the other and so far apart that no level of lightness blurs into the next.
     planes = np.zeros((_BINS, _BINS + 2, _BINS), np.float32)
     planes[:, :_BINS] = sheet.reshape(_BINS, _BINS, _BINS)
-    stack = planes.reshape(-1, _BINS)
-    stack = cv2.GaussianBlur(stack, (5, 5), _COLOUR_SPREAD, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(stack.reshape(planes.shape)[:, :_BINS].ravel())
+    stack = cv2.GaussianBlur(
+        planes.reshape(-1, _BINS), (5, 5), _COLOUR_SPREAD, borderType=cv2.BORDER_CONSTANT
+    )
+    return np.asarray(stack.reshape(planes.shape)[:, :_BINS].ravel(), np.float32)

@@ -53,16 +53,16 @@ class Beside:
             columns = np.where(flat, u[..., None], there * v[..., None]) + vanishing[0]
             rows = np.where(flat, u[..., None] / there, v[..., None]) + (vanishing[1] - view.top)
         height, width = view.shape[0] - view.top, view.shape[1]
-        columns, rows = (np.round(np.clip(part, -9.0, 9e3)).astype(np.intp) for part in (columns, rows))
+        columns, rows = np.rint(columns), np.rint(rows)
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
         self._sections = sections
-        self._places = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+        self._places = np.where(inside, rows * width + columns, 0.0).astype(np.intp)
         self._inside = inside
         self._count = self._by_section(inside)
 
     def means(self, values: NDArray[Any]) -> Array:
         """Mean (2, N, sections) of values (H - view.top, W) left and right of each section; nan outside the picture."""
-        total = self._by_section(np.where(self._inside, values[self._places], 0.0))
+        total = self._by_section(np.where(self._inside, values.ravel().take(self._places), 0.0))
         enough = self._count >= _SAMPLES * _ACROSS // 2
         return np.where(enough, total / np.maximum(self._count, 1), np.nan)
 

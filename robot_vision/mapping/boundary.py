@@ -155,38 +155,34 @@ class BoundaryFinder:
         Amini, Weymouth and Jain 1990, one step a column: the sum of edge strength and cost of bends is least.
         """
         reach = self.snake
-        edge = np.asarray(np.abs(cv2.Scharr(gray, cv2.CV_32F, 0, 1)) / 32.0, np.float32)
+        edge = np.abs(cv2.Scharr(gray, cv2.CV_16S, 0, 1))
         offsets = np.arange(-reach, reach + 1)
         base = np.round(place).astype(int)
         rows = np.clip(base[:, None] + offsets, top + 1, gray.shape[0] - 2)
         columns = np.arange(len(place))[:, None]
-        strength = edge[rows, columns]
+        strength = edge[rows, columns].astype(np.float32) / np.float32(32.0)
         cost = -np.minimum(strength, 12.0) / 12.0 + 0.03 * np.abs(offsets)
         bend = self.stiffness * np.abs(offsets[:, None] - offsets[None, :]).astype(np.float32)
-        best = np.empty(cost.shape, np.float32)
-        came = np.zeros(cost.shape, np.int64)
-        best[0] = cost[0]
-        jumps = np.diff(base)
-        for k in range(1, len(place)):
-            if abs(jumps[k - 1]) > 2 * reach:  # another thing begins: nothing holds the two ends together
-                best[k] = cost[k] + best[k - 1].min()
-                came[k] = int(best[k - 1].argmin())
-                continue
-            step = best[k - 1][None, :] + bend
-            came[k] = step.argmin(axis=1)
-            best[k] = cost[k] + step[np.arange(len(offsets)), came[k]]
-        chosen = np.zeros(len(place), int)
-        chosen[-1] = int(best[-1].argmin())
-        for k in range(len(place) - 1, 0, -1):
-            chosen[k - 1] = came[k, chosen[k]]
-        moved = rows[np.arange(len(place)), chosen]
+        # Where another thing begins nothing holds the two ends together.
+        free = np.abs(np.diff(base)) > 2 * reach
+        bends = np.where(free[:, None, None], np.float32(0.0), bend)
+        best = cost.astype(np.float32)
+        step = np.empty_like(bend)
+        for before, here, way, price in zip(best[:-1], best[1:], bends, cost[1:], strict=True):
+            np.add(before, way, out=step)
+            np.add(price, np.minimum.reduce(step, axis=1), out=here)
+        came = (best[:-1, None, :] + bends).argmin(axis=2).tolist()
+        chosen = [int(best[-1].argmin())]
+        for origin in reversed(came):
+            chosen.append(origin[chosen[-1]])
+        moved = rows[np.arange(len(place)), chosen[::-1]]
         return self._subpixel(edge, moved)
 
     @staticmethod
-    def _subpixel(edge: Scores, rows: NDArray[np.int64]) -> Array:
+    def _subpixel(edge: NDArray[np.int16], rows: NDArray[np.int64]) -> Array:
         """Vertex of the parabola through the edge strengths about each row."""
         columns = np.arange(len(rows))
-        low, mid, high = (edge[rows + d, columns].astype(np.float64) for d in (-1, 0, 1))
+        low, mid, high = (edge[rows + d, columns] / 32.0 for d in (-1, 0, 1))
         curve = low - 2.0 * mid + high
         shift = np.where(curve < -1e-3, 0.5 * (low - high) / np.minimum(curve, -1e-3), 0.0)
         return np.asarray(rows + np.clip(shift, -0.5, 0.5))
@@ -205,4 +201,5 @@ def _median(values: Array, width: int) -> Array:
     if width < 3:
         return values
     padded = np.pad(values, width // 2, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
+    return np.asarray(np.sort(windows, axis=1)[:, width // 2])

@@ -150,6 +150,8 @@ class GroundLines:
 
     def straighten(self, boundary: Boundary, borders: Borders, view: GroundView) -> Boundary:
         """Draw the end of the floor to the borders that run close to it."""
+        if not len(borders.ends):
+            return boundary
         rows = boundary.rows.copy()
         columns = np.arange(len(rows))
         nearest = np.full(len(rows), self.snap)

@@ -70,8 +70,13 @@ class ObjectFinder:
             width = float(np.hypot(x[-1] - x[0], y[-1] - y[0]))
             if width > self.widest:
                 continue
-            near = float(np.median(distance[left:after]))
             found.append(
-                GroundObject(int(left), right, float(np.median(x)), float(np.median(y)), width, near)
+                GroundObject(int(left), right, _median(x), _median(y), width, _median(distance[left:after]))
             )
         return found
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    """Median of a few numbers (N,); that of numpy looks for nan first, which takes longer than all else."""
+    ordered = np.sort(values)
+    return float(0.5 * (ordered[(len(values) - 1) // 2] + ordered[len(values) // 2]))

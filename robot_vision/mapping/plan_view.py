@@ -63,19 +63,21 @@ class Seen:
         u, v = self.view.pixels(x, y)
         rows, columns = self.view.shape
         inside = (u > -0.5) & (u < columns - 0.5) & (v < rows - 0.5)
-        column = np.where(inside, np.round(np.where(inside, u, 0.0)), 0).astype(np.intp)
-        away = np.hypot(x - self.view.camera.x_m, y)
+        column = np.round(u[inside]).astype(np.intp)
+        away = np.hypot(x[inside] - self.view.camera.x_m, y[inside])
         # At the end of the floor distances grow too fast with the row for a whole one to do.
         behind = away - self.boundary.distance[column]
         ended = self.boundary.ended[column]
         # `inside` is measured across the end; along the ray, which meets it at an angle, it is longer.
         slant = 1.0 / np.maximum(self.boundary.facing, _FLATTEST)[column]
-        looked_at = inside & (away < self.reach)
-        free = looked_at & (behind < np.where(ended, -self.margin, 0.0))
-        there = looked_at & ended & (behind >= self.inside) & (behind < self.thickness)
+        within = away < self.reach
+        free = within & (behind < np.where(ended, -self.margin, 0.0))
+        there = within & ended & (behind >= self.inside) & (behind < self.thickness)
+        told = np.full(len(column), UNKNOWN, np.int8)
+        told[free] = FREE
+        told[there] = np.where(behind >= self.inside * slant, OCCUPIED, DOUBTFUL)[there]
         cells = np.full(np.shape(x), UNKNOWN, np.int8)
-        cells[free] = FREE
-        cells[there] = np.where(behind >= self.inside * slant, OCCUPIED, DOUBTFUL)[there]
+        cells[inside] = told
         return cells
 
 
