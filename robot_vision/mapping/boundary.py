@@ -150,10 +150,9 @@ class BoundaryFinder:
         return rows
 
     def _snap(self, place: Array, gray: NDArray[np.uint8], top: int) -> Array:
-        """Move the boundary to the edge near it as one line: an active contour solved by dynamic programming.
+        """Move the boundary to the edge near it as one line: strong edge and few bends, weighed against each other."""
+        from robot_vision.mapping.contour import contour  # numba: slow to import
 
-        Amini, Weymouth and Jain 1990, one step a column: the sum of edge strength and cost of bends is least.
-        """
         reach = self.snake
         edge = np.abs(cv2.Scharr(gray, cv2.CV_16S, 0, 1))
         offsets = np.arange(-reach, reach + 1)
@@ -164,18 +163,9 @@ class BoundaryFinder:
         cost = -np.minimum(strength, 12.0) / 12.0 + 0.03 * np.abs(offsets)
         bend = self.stiffness * np.abs(offsets[:, None] - offsets[None, :]).astype(np.float32)
         # Where another thing begins nothing holds the two ends together.
-        free = np.abs(np.diff(base)) > 2 * reach
-        bends = np.where(free[:, None, None], np.float32(0.0), bend)
-        best = cost.astype(np.float32)
-        step = np.empty_like(bend)
-        for before, here, way, price in zip(best[:-1], best[1:], bends, cost[1:], strict=True):
-            np.add(before, way, out=step)
-            np.add(price, np.minimum.reduce(step, axis=1), out=here)
-        came = (best[:-1, None, :] + bends).argmin(axis=2).tolist()
-        chosen = [int(best[-1].argmin())]
-        for origin in reversed(came):
-            chosen.append(origin[chosen[-1]])
-        moved = rows[np.arange(len(place)), chosen[::-1]]
+        broken = np.abs(np.diff(base)) > 2 * reach
+        chosen = contour(cost, bend, broken)
+        moved = rows[np.arange(len(place)), chosen]
         return self._subpixel(edge, moved)
 
     @staticmethod
@@ -190,8 +180,8 @@ class BoundaryFinder:
 
 def _facing(ahead: Array, left: Array, distance: Array) -> Array:
     """Sine of the angle between ray and end of the floor (W,), over two columns to either side."""
-    x, y = (np.pad(part, _SIDE, mode="edge") for part in (ahead, left))
-    along_x, along_y = (part[2 * _SIDE :] - part[: -2 * _SIDE] for part in (x, y))
+    before, after = (_neighbours(len(ahead), side) for side in (-_SIDE, _SIDE))
+    along_x, along_y = (part[after] - part[before] for part in (ahead, left))
     across = np.abs(ahead * along_y - left * along_x)
     return np.asarray(across / np.maximum(distance * np.hypot(along_x, along_y), 1e-9))
 
@@ -200,6 +190,11 @@ def _median(values: Array, width: int) -> Array:
     """Running median of an odd width."""
     if width < 3:
         return values
-    padded = np.pad(values, width // 2, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    return np.asarray(np.sort(windows, axis=1)[:, width // 2])
+    half = width // 2
+    windows = np.stack([values[_neighbours(len(values), side)] for side in range(-half, half + 1)])
+    return np.asarray(np.sort(windows, axis=0)[half])
+
+
+def _neighbours(count: int, side: int) -> NDArray[np.intp]:
+    """Numbers (N,) of the columns so many to the right of each; the outermost one where there is none."""
+    return np.clip(np.arange(side, count + side), 0, count - 1)

@@ -100,13 +100,12 @@ class FloorMotion:
         usual = np.array(_USUAL)
         usual[3] = slip
         prior = np.diag(1.0 / usual**2)
-        information, unknown = prior, np.zeros(len(usual))
-        weight: Array = np.ones(len(error))
+        information, unknown, weight = prior, np.zeros(len(usual)), np.ones_like(error)
         for _ in range(6):
             weighted = terms.T * weight
             information = weighted @ terms + prior
             unknown = np.linalg.solve(information, weighted @ error)
             rest = (error - terms @ unknown).reshape(-1, 2)
-            weight = np.repeat(1.0 / (1.0 + (rest**2).sum(axis=1) / 8.0), 2)
+            weight = np.asarray(np.repeat(1.0 / (1.0 + (rest**2).sum(axis=1) / 8.0), 2), np.float64)
         sigma_common = float(np.sqrt(np.linalg.inv(information)[5, 5]))
         return Disagreement._make([*(float(value) for value in unknown), sigma_common])
