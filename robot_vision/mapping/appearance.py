@@ -54,7 +54,7 @@ class FloorAppearance:
             sample: (H, W) which of its pixels are floor for certain.
             above: (K, W, 3) the part above the horizon.
         """
-        self._floor = self._mixed(self._floor, _histogram(lab[sample]))
+        self._floor = self._mixed(self._floor, _histogram(np.compress(sample.ravel(), lab.reshape(-1, 3), 0)))
         self._other = self._mixed(self._other, _histogram(above.reshape(-1, 3)[::3]))
         even = np.float32(self.unseen / _BINS**3)
         other = np.float32(0.5) * self._other + np.float32(20.0) * even

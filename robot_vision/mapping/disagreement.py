@@ -100,7 +100,7 @@ class FloorMotion:
         usual = np.array(_USUAL)
         usual[3] = slip
         prior = np.diag(1.0 / usual**2)
-        information, unknown, weight = prior, np.zeros(len(usual)), np.ones_like(error)
+        information, unknown, weight = prior, np.zeros_like(usual), np.ones_like(error)
         for _ in range(6):
             weighted = terms.T * weight
             information = weighted @ terms + prior

@@ -66,7 +66,7 @@ class ShadowFinder:
             bgr: (H, W, 3) the part of the picture that may show floor.
             floor: (H, W) what of it is floor for certain.
         """
-        light = _LINEAR[bgr[floor]]
+        light = _LINEAR.take(np.compress(floor.ravel(), bgr.reshape(-1, 3), axis=0))
         if not len(light):
             return
         lit = np.quantile(light, 0.6, axis=0).astype(np.float32)
