@@ -191,6 +191,7 @@ def warm_steps() -> list[tuple[str, Callable[[], None]]]:
     return [
         ("lines", _find_lines),
         ("vanishing points", _find_vanishing_points),
+        ("plan view", _draw_plan),
         ("planning", _plan),
         ("mazes", _explore),
         ("crop rows", _find_crop_rows),
@@ -202,6 +203,12 @@ def _find_lines() -> None:
     from robot_vision.perception import LineDetector
 
     LineDetector().warm_up()
+
+
+def _draw_plan() -> None:
+    from robot_vision.mapping import PlanViewMapper
+
+    PlanViewMapper().warm_up()
 
 
 def _find_crop_rows() -> None:

@@ -35,10 +35,11 @@ class FloorAppearance:
     limit: float = 3.0
     _floor: Scores | None = field(default=None, init=False, repr=False)
     _other: Scores | None = field(default=None, init=False, repr=False)
+    _ratio: Scores | None = field(default=None, init=False, repr=False)
 
     def reset(self) -> None:
         """Forget what the floor looks like."""
-        self._floor = self._other = None
+        self._floor = self._other = self._ratio = None
 
     @property
     def knows(self) -> bool:
@@ -53,8 +54,11 @@ class FloorAppearance:
             sample: (H, W) which of its pixels are floor for certain.
             above: (K, W, 3) the part above the horizon.
         """
-        self._floor = self._mixed(self._floor, _histogram(lab[sample]))
+        self._floor = self._mixed(self._floor, _histogram(np.compress(sample.ravel(), lab.reshape(-1, 3), 0)))
         self._other = self._mixed(self._other, _histogram(above.reshape(-1, 3)[::3]))
+        even = np.float32(self.unseen / _BINS**3)
+        other = np.float32(0.5) * self._other + np.float32(20.0) * even
+        self._ratio = np.clip(np.log((self._floor + even) / other), -self.limit, self.limit)
 
     def score(self, lab: Pixels) -> Scores:
         """Log ratio (H, W) of floor to anything else, positive for floor.
@@ -62,12 +66,9 @@ class FloorAppearance:
         Raises:
             ValueError: nothing has been learnt yet.
         """
-        if self._floor is None or self._other is None:
+        if self._ratio is None:
             raise ValueError("no floor has been learnt yet")
-        even = np.float32(self.unseen / _BINS**3)
-        other = np.float32(0.5) * self._other + np.float32(20.0) * even
-        table = np.clip(np.log((self._floor + even) / other), -self.limit, self.limit)
-        return np.asarray(table[_codes(lab)])
+        return np.asarray(self._ratio.take(_codes(lab)))
 
     def _mixed(self, old: Scores | None, new: Scores) -> Scores:
         if old is None:
@@ -76,12 +77,13 @@ class FloorAppearance:
         return np.asarray(share * old + (1 - share) * new)
 
 
-def _codes(lab: Pixels) -> NDArray[np.int32]:
+def _codes(lab: Pixels) -> NDArray[np.uint16]:
     """Number of the histogram's bin (H, W): 8 levels of lightness a bin, 4 of each colour axis about grey."""
-    light = (lab[..., 0] >> 3).astype(np.int32) << 10
-    a = np.clip((lab[..., 1].astype(np.int32) - 64) >> 2, 0, _BINS - 1) << 5
-    b = np.clip((lab[..., 2].astype(np.int32) - 64) >> 2, 0, _BINS - 1)
-    return np.asarray(light + a + b)
+    code = (lab[..., 0] >> 3).astype(np.uint16)
+    for axis in (1, 2):
+        code <<= 5
+        code |= (np.clip(lab[..., axis], 64, 191) - np.uint8(64)) >> 2
+    return code
 
 
 def _histogram(lab: Pixels) -> Scores:
@@ -92,7 +94,10 @@ def _histogram(lab: Pixels) -> Scores:
     sheet = np.asarray(
         cv2.GaussianBlur(sheet, (1, 7), 1.0, sigmaY=_LIGHT_SPREAD, borderType=cv2.BORDER_CONSTANT), np.float32
     )
-    for plane in sheet.reshape(_BINS, _BINS, _BINS):
-        if plane.any():
-            plane[:] = cv2.GaussianBlur(plane, (5, 5), _COLOUR_SPREAD, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(sheet.ravel())
+    # One below the other and so far apart that no level of lightness blurs into the next.
+    planes = np.zeros((_BINS, _BINS + 2, _BINS), np.float32)
+    planes[:, :_BINS] = sheet.reshape(_BINS, _BINS, _BINS)
+    stack = cv2.GaussianBlur(
+        planes.reshape(-1, _BINS), (5, 5), _COLOUR_SPREAD, borderType=cv2.BORDER_CONSTANT
+    )
+    return np.asarray(stack.reshape(planes.shape)[:, :_BINS].ravel(), np.float32)

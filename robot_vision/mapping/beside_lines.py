@@ -41,28 +41,30 @@ class Beside:
         sections: int = SECTIONS,
     ) -> None:
         part = ((np.arange(sections * _SAMPLES) + 0.5) / (sections * _SAMPLES))[:, None]
-        u = (ends[:, 0] + part * (ends[:, 2] - ends[:, 0])).T - vanishing[0]
-        v = (ends[:, 1] + part * (ends[:, 3] - ends[:, 1])).T - vanishing[1]
+        u = (ends[:, 0] + part * (ends[:, 2] - ends[:, 0])).T[..., None] - vanishing[0]
+        v = (ends[:, 1] + part * (ends[:, 3] - ends[:, 1])).T[..., None] - vanishing[1]
         # On the ground a line to the vanishing point lies at u / v camera heights to the right (20.3).
         v = np.maximum(v, 1.0)
-        aside = (u / v)[..., None]
         shift = np.array([-1.0, 1.0])[:, None, None, None] * np.linspace(*strip, _ACROSS)
-        there = aside + shift / (view.camera.height_m or 1.0)
-        flat = (np.abs(u) > np.abs(v))[..., None] & (there * aside > 0.0)
-        with np.errstate(divide="ignore"):
-            columns = np.where(flat, u[..., None], there * v[..., None]) + vanishing[0]
-            rows = np.where(flat, u[..., None] / there, v[..., None]) + (vanishing[1] - view.top)
+        there = u / v + shift / (view.camera.height_m or 1.0)
+        down = vanishing[1] - view.top
+        columns = np.rint(there * v + vanishing[0])
+        rows = np.broadcast_to(np.rint(v + down), there.shape).copy()
+        flat = (np.abs(u) > v) & (there * u > 0.0)
+        if flat.any():
+            level = np.broadcast_to(u, there.shape)[flat]
+            columns[flat] = np.rint(level + vanishing[0])
+            rows[flat] = np.rint(level / there[flat] + down)
         height, width = view.shape[0] - view.top, view.shape[1]
-        columns, rows = (np.round(np.clip(part, -9.0, 9e3)).astype(np.intp) for part in (columns, rows))
         inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
         self._sections = sections
-        self._places = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+        self._places = np.where(inside, rows * width + columns, 0.0).astype(np.intp)
         self._inside = inside
         self._count = self._by_section(inside)
 
     def means(self, values: NDArray[Any]) -> Array:
         """Mean (2, N, sections) of values (H - view.top, W) left and right of each section; nan outside the picture."""
-        total = self._by_section(np.where(self._inside, values[self._places], 0.0))
+        total = self._by_section(np.where(self._inside, values.ravel().take(self._places), 0.0))
         enough = self._count >= _SAMPLES * _ACROSS // 2
         return np.where(enough, total / np.maximum(self._count, 1), np.nan)
 

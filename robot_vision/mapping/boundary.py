@@ -150,43 +150,29 @@ class BoundaryFinder:
         return rows
 
     def _snap(self, place: Array, gray: NDArray[np.uint8], top: int) -> Array:
-        """Move the boundary to the edge near it as one line: an active contour solved by dynamic programming.
+        """Move the boundary to the edge near it as one line: strong edge and few bends, weighed against each other."""
+        from robot_vision.mapping.contour import contour  # numba: slow to import
 
-        Amini, Weymouth and Jain 1990, one step a column: the sum of edge strength and cost of bends is least.
-        """
         reach = self.snake
-        edge = np.asarray(np.abs(cv2.Scharr(gray, cv2.CV_32F, 0, 1)) / 32.0, np.float32)
+        edge = np.abs(cv2.Scharr(gray, cv2.CV_16S, 0, 1))
         offsets = np.arange(-reach, reach + 1)
         base = np.round(place).astype(int)
         rows = np.clip(base[:, None] + offsets, top + 1, gray.shape[0] - 2)
         columns = np.arange(len(place))[:, None]
-        strength = edge[rows, columns]
+        strength = edge[rows, columns].astype(np.float32) / np.float32(32.0)
         cost = -np.minimum(strength, 12.0) / 12.0 + 0.03 * np.abs(offsets)
         bend = self.stiffness * np.abs(offsets[:, None] - offsets[None, :]).astype(np.float32)
-        best = np.empty(cost.shape, np.float32)
-        came = np.zeros(cost.shape, np.int64)
-        best[0] = cost[0]
-        jumps = np.diff(base)
-        for k in range(1, len(place)):
-            if abs(jumps[k - 1]) > 2 * reach:  # another thing begins: nothing holds the two ends together
-                best[k] = cost[k] + best[k - 1].min()
-                came[k] = int(best[k - 1].argmin())
-                continue
-            step = best[k - 1][None, :] + bend
-            came[k] = step.argmin(axis=1)
-            best[k] = cost[k] + step[np.arange(len(offsets)), came[k]]
-        chosen = np.zeros(len(place), int)
-        chosen[-1] = int(best[-1].argmin())
-        for k in range(len(place) - 1, 0, -1):
-            chosen[k - 1] = came[k, chosen[k]]
+        # Where another thing begins nothing holds the two ends together.
+        broken = np.abs(np.diff(base)) > 2 * reach
+        chosen = contour(cost, bend, broken)
         moved = rows[np.arange(len(place)), chosen]
         return self._subpixel(edge, moved)
 
     @staticmethod
-    def _subpixel(edge: Scores, rows: NDArray[np.int64]) -> Array:
+    def _subpixel(edge: NDArray[np.int16], rows: NDArray[np.int64]) -> Array:
         """Vertex of the parabola through the edge strengths about each row."""
         columns = np.arange(len(rows))
-        low, mid, high = (edge[rows + d, columns].astype(np.float64) for d in (-1, 0, 1))
+        low, mid, high = (edge[rows + d, columns] / 32.0 for d in (-1, 0, 1))
         curve = low - 2.0 * mid + high
         shift = np.where(curve < -1e-3, 0.5 * (low - high) / np.minimum(curve, -1e-3), 0.0)
         return np.asarray(rows + np.clip(shift, -0.5, 0.5))
@@ -194,8 +180,8 @@ class BoundaryFinder:
 
 def _facing(ahead: Array, left: Array, distance: Array) -> Array:
     """Sine of the angle between ray and end of the floor (W,), over two columns to either side."""
-    x, y = (np.pad(part, _SIDE, mode="edge") for part in (ahead, left))
-    along_x, along_y = (part[2 * _SIDE :] - part[: -2 * _SIDE] for part in (x, y))
+    before, after = (_neighbours(len(ahead), side) for side in (-_SIDE, _SIDE))
+    along_x, along_y = (part[after] - part[before] for part in (ahead, left))
     across = np.abs(ahead * along_y - left * along_x)
     return np.asarray(across / np.maximum(distance * np.hypot(along_x, along_y), 1e-9))
 
@@ -204,5 +190,11 @@ def _median(values: Array, width: int) -> Array:
     """Running median of an odd width."""
     if width < 3:
         return values
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
+    half = width // 2
+    windows = np.stack([values[_neighbours(len(values), side)] for side in range(-half, half + 1)])
+    return np.asarray(np.sort(windows, axis=0)[half])
+
+
+def _neighbours(count: int, side: int) -> NDArray[np.intp]:
+    """Numbers (N,) of the columns so many to the right of each; the outermost one where there is none."""
+    return np.clip(np.arange(side, count + side), 0, count - 1)

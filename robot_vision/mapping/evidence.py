@@ -80,7 +80,8 @@ def sharp(gray: NDArray[np.uint8], contrast: float, rows: int) -> Mask:
 
     Where floor meets a thing there is an edge; the glare of a lamp and the shade about a thing end softly.
     """
-    down = cv2.Sobel(gray, cv2.CV_32F, 0, 1, scale=1.0 / 8.0)
-    across = cv2.Sobel(gray, cv2.CV_32F, 1, 0, scale=1.0 / 8.0)
-    strength = np.maximum(np.abs(down), np.abs(across))
-    return np.asarray(cv2.dilate(strength, np.ones((2 * rows + 1, 3), np.uint8)) > contrast)
+    down, across = (cv2.Sobel(gray, cv2.CV_16S, *order) for order in ((0, 1), (1, 0)))
+    strength = cv2.max(np.abs(down), np.abs(across))
+    # Sobel adds up the differences over two pixels, with weights that sum to four.
+    edge = (strength > int(8.0 * contrast)).astype(np.uint8)
+    return np.asarray(cv2.dilate(edge, np.ones((2 * rows + 1, 3), np.uint8)), np.bool_)

@@ -61,7 +61,7 @@ class FloorSample:
         height = view.camera.height_m or 1.0
         first = view.top + int(self.lowest * (rows - view.top))
         v = np.arange(first, rows, dtype=np.float64)
-        _, y = view.ground(*np.meshgrid(np.arange(columns, dtype=np.float64), v))
+        _, y = view.ground(np.arange(columns, dtype=np.float64), v[:, None])
         sample = np.zeros(lab.shape[:2], bool)
         part = sample[-len(v) :]
         part[:] = np.abs(y) < self.half_width * height

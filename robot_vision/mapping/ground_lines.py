@@ -50,7 +50,8 @@ class Borders:
     def along(cls, ends: Array, stops: Mask) -> Borders:
         """The runs of marked sections (2, N, sections), of the left and right sides of lines (N, 4)."""
         sections = stops.shape[2]
-        change = np.diff(np.pad(stops, [(0, 0), (0, 0), (1, 1)]).astype(np.int8), axis=2)
+        outside = np.int8(0)
+        change = np.diff(stops.astype(np.int8), axis=2, prepend=outside, append=outside)
         side, line, first = np.nonzero(change == 1)
         last = np.nonzero(change == -1)[2]
         if not len(line):
@@ -150,6 +151,8 @@ class GroundLines:
 
     def straighten(self, boundary: Boundary, borders: Borders, view: GroundView) -> Boundary:
         """Draw the end of the floor to the borders that run close to it."""
+        if not len(borders.ends):
+            return boundary
         rows = boundary.rows.copy()
         columns = np.arange(len(rows))
         nearest = np.full(len(rows), self.snap)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,20 +29,30 @@ class GroundView:
     scale: float = 1.0
 
     @cached_property
-    def matrix(self) -> Array:
-        """(3, 3) from ground points (x, y, 1), m in base_link, to homogeneous working pixels (20.2, 20.3)."""
+    def projection(self) -> Array:
+        """(3, 4) from points (x, y, z, 1), m in base_link, to homogeneous working pixels."""
         pose = np.linalg.inv(GroundPlane(self.camera).base_from_optical)
-        plane = self.camera.matrix @ pose[:3][:, [0, 1, 3]]
         shift = (self.scale - 1.0) / 2.0
         scaling = np.array([[self.scale, 0.0, shift], [0.0, self.scale, shift], [0.0, 0.0, 1.0]])
-        return np.asarray(scaling @ plane)
+        return np.asarray(scaling @ self.camera.matrix @ pose[:3])
+
+    @cached_property
+    def matrix(self) -> Array:
+        """(3, 3) from ground points (x, y, 1), m in base_link, to homogeneous working pixels (20.2, 20.3)."""
+        return self.projection[:, [0, 1, 3]]
+
+    def planes(self, shares: Sequence[float]) -> Array:
+        """As `matrix` (N, 3, 3) for planes that lie by shares of the camera's height above the floor."""
+        raised = np.tile(self.matrix, (len(shares), 1, 1))
+        raised[:, :, 2] += np.outer(shares, self.projection[:, 2] * (self.camera.height_m or 1.0))
+        return raised
 
     @cached_property
     def inverse(self) -> Array:
         """(3, 3) from homogeneous working pixels to ground points."""
         return np.asarray(np.linalg.inv(self.matrix))
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the working picture."""
         return round(self.camera.height * self.scale), round(self.camera.width * self.scale)

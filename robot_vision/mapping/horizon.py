@@ -103,11 +103,12 @@ class HorizonFilter:
             stamp_s: of the picture, s.
             pitch_rate: of the robot, rad/s, nose down positive; None when nobody knows.
         """
+        camera = camera.rectified()
         self._predict(camera, stamp_s, pitch_rate)
         assert self._lean is not None
         knocked, steady = 0.0, True
         if points is not None and len(points):
-            told = estimate_attitude(replace(points, camera=camera.rectified()), _LOOSE)
+            told = estimate_attitude(replace(points, camera=camera), _LOOSE)
             if told.seen:
                 measured, noise = (
                     np.array([told.roll, told.pitch]),
@@ -128,7 +129,7 @@ class HorizonFilter:
                     self._lean = self._lean + gain @ off
                     self._covariance = (np.eye(2) - gain) @ self._covariance
         roll, pitch = (float(angle) for angle in self._lean)
-        leaning = replace(camera.rectified(), roll=roll, pitch=pitch)
+        leaning = replace(camera, roll=roll, pitch=pitch)
         return Horizon(leaning, self._covariance.copy(), steady, knocked)
 
     def correct(self, pitch_error: float, sigma: float) -> None:

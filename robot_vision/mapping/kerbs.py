@@ -210,7 +210,9 @@ class KerbFinder:
 
 def _runs(here: Mask) -> Mask:
     """Of marks along the last axis those with a neighbour; a single gap between marks is closed."""
-    padded = np.pad(here, [(0, 0)] * (here.ndim - 1) + [(1, 1)])
-    closed = here | (padded[..., :-2] & padded[..., 2:])
-    padded = np.pad(closed, [(0, 0)] * (here.ndim - 1) + [(1, 1)])
-    return np.asarray(closed & (padded[..., :-2] | padded[..., 2:]))
+    closed = here.copy()
+    closed[..., 1:-1] |= here[..., :-2] & here[..., 2:]
+    beside = np.zeros_like(here)
+    beside[..., 1:] |= closed[..., :-1]
+    beside[..., :-1] |= closed[..., 1:]
+    return np.asarray(closed & beside)

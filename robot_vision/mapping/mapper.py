@@ -231,11 +231,11 @@ class PlanViewMapper:
         if parallax is not None and np.isfinite(parallax.slip):
             self.horizon.correct(parallax.pitch_error, parallax.pitch_sigma)
         score = self.evidence.score(likeness, parallax)
-        shadow = self.shadows.find(lower, score, view, parallax)
+        dim = self.shadows.dim(lower)
+        shadow = self.shadows.find(dim, score, view, parallax)
         score[shadow] = 1.0
         kinds, borders = np.zeros(len(lines), np.intp), Borders.none()
         if points is not None:
-            dim = self.shadows.dim(lower)
             kinds, borders = self.lines.sort(lines, points, score, dim, view)
             if self.low_borders:
                 borders = borders.joined(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,16 +63,19 @@ class ObjectFinder:
         found = []
         for left, after in zip(edges[:-1], edges[1:], strict=True):
             right = int(after) - 1
-            if after - left < self.narrowest or not boundary.ended[left:after].all():
-                continue
-            if on_border[left:after].mean() > self.bordered:
+            if after - left < self.narrowest or not boundary.ended[left]:
                 continue
             x, y = boundary.x[left:after], boundary.y[left:after]
-            width = float(np.hypot(x[-1] - x[0], y[-1] - y[0]))
-            if width > self.widest:
+            width = math.hypot(x[-1] - x[0], y[-1] - y[0])
+            if width > self.widest or on_border[left:after].mean() > self.bordered:
                 continue
-            near = float(np.median(distance[left:after]))
             found.append(
-                GroundObject(int(left), right, float(np.median(x)), float(np.median(y)), width, near)
+                GroundObject(int(left), right, _median(x), _median(y), width, _median(distance[left:after]))
             )
         return found
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    """Median of a few numbers (N,); that of numpy looks for nan first, which takes longer than all else."""
+    ordered = np.sort(values)
+    return float(0.5 * (ordered[(len(values) - 1) // 2] + ordered[len(values) // 2]))

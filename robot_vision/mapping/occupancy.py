@@ -90,21 +90,19 @@ class OccupancyMap:
         self._last = pose
         corner = self._move(pose)
         rows, columns = self._rectangle(seen, pose, corner)
-        y, x = np.meshgrid(
-            (np.arange(rows.start, rows.stop) + corner[1] + 0.5) * self.resolution - pose.y,
-            (np.arange(columns.start, columns.stop) + corner[0] + 0.5) * self.resolution - pose.x,
-            indexing="ij",
-        )
+        y = ((np.arange(rows.start, rows.stop) + corner[1] + 0.5) * self.resolution - pose.y)[:, None]
+        x = (np.arange(columns.start, columns.stop) + corner[0] + 0.5) * self.resolution - pose.x
         cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
         ahead, left = (cos * x + sin * y), (cos * y - sin * x)
         cells = seen.at(ahead, left)
-        weight = trust / (1.0 + (np.hypot(ahead, left) / self.near) ** 2)
-        part = self._odds[rows, columns]
-        part += np.where(cells == OCCUPIED, self.taken, np.where(cells == FREE, -self.free, 0.0)) * weight
+        known = cells != UNKNOWN
+        told = cells[known]
+        weight = trust / (1.0 + (np.hypot(ahead[known], left[known]) / self.near) ** 2)
+        old = self._odds[rows, columns][known]
+        new = old + np.where(told == FREE, -self.free, self.taken) * weight
         # What ends somewhere about here speaks against free floor, but for nothing in its place.
-        doubt = cells == DOUBTFUL
-        part[doubt] = np.minimum(part[doubt] + self.taken * weight[doubt], np.maximum(part[doubt], 0.0))
-        np.clip(part, -self.limit, self.limit, out=part)
+        new = np.where(told == DOUBTFUL, np.minimum(new, np.maximum(old, 0.0)), new)
+        self._odds[rows, columns][known] = np.clip(new, -self.limit, self.limit)
 
     def odds(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> LogOdds:
         """Log-odds of being taken of points x, y (m) in odom, 0 for unknown ones, in their shape."""

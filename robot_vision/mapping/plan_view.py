@@ -59,23 +59,26 @@ class Seen:
     inside: float = 0.025
 
     def at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> Cells:
-        """FREE, OCCUPIED, DOUBTFUL or UNKNOWN for points x, y (m) in base_link, in any shape."""
+        """FREE, OCCUPIED, DOUBTFUL or UNKNOWN for points x, y (m) in base_link, in the shape they make together."""
         u, v = self.view.pixels(x, y)
         rows, columns = self.view.shape
         inside = (u > -0.5) & (u < columns - 0.5) & (v < rows - 0.5)
-        column = np.where(inside, np.round(np.where(inside, u, 0.0)), 0).astype(np.intp)
-        away = np.hypot(x - self.view.camera.x_m, y)
+        x, y = np.broadcast_arrays(x, y)
+        column = np.round(u[inside]).astype(np.intp)
+        away = np.hypot(x[inside] - self.view.camera.x_m, y[inside])
         # At the end of the floor distances grow too fast with the row for a whole one to do.
         behind = away - self.boundary.distance[column]
         ended = self.boundary.ended[column]
         # `inside` is measured across the end; along the ray, which meets it at an angle, it is longer.
         slant = 1.0 / np.maximum(self.boundary.facing, _FLATTEST)[column]
-        looked_at = inside & (away < self.reach)
-        free = looked_at & (behind < np.where(ended, -self.margin, 0.0))
-        there = looked_at & ended & (behind >= self.inside) & (behind < self.thickness)
-        cells = np.full(np.shape(x), UNKNOWN, np.int8)
-        cells[free] = FREE
-        cells[there] = np.where(behind >= self.inside * slant, OCCUPIED, DOUBTFUL)[there]
+        within = away < self.reach
+        free = within & (behind < np.where(ended, -self.margin, 0.0))
+        there = within & ended & (behind >= self.inside) & (behind < self.thickness)
+        told = np.full(len(column), UNKNOWN, np.int8)
+        told[free] = FREE
+        told[there] = np.where(behind >= self.inside * slant, OCCUPIED, DOUBTFUL)[there]
+        cells = np.full(inside.shape, UNKNOWN, np.int8)
+        cells[inside] = told
         return cells
 
 
@@ -105,13 +108,13 @@ class PlanViewMaker:
                 raise ValueError(f"{name} must be a positive number, not {value}")
         middles = (np.arange(round(self.length / self.resolution)) + 0.5) * self.resolution
         sides = (np.arange(round(2 * self.half_width / self.resolution)) + 0.5) * self.resolution
-        x, y = np.meshgrid(middles, sides - self.half_width)
-        object.__setattr__(self, "_x", x)
-        object.__setattr__(self, "_y", y)
+        object.__setattr__(self, "_x", middles)
+        object.__setattr__(self, "_y", (sides - self.half_width)[:, None])
 
     def draw(self, seen: Seen | None) -> PlanView:
         """The plan of what was seen; all unknown when nothing was."""
         x, y = self.__dict__["_x"], self.__dict__["_y"]
-        cells = np.full(x.shape, UNKNOWN, np.int8) if seen is None else seen.at(x, y)
+        shape = len(y), len(x)
+        cells = np.full(shape, UNKNOWN, np.int8) if seen is None else seen.at(x, y)
         cells[cells == DOUBTFUL] = OCCUPIED
         return PlanView(cells, self.resolution, (0.0, -self.half_width))

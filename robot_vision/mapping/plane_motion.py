@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from functools import reduce
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry.rotation import wrap_angle
+from robot_vision.mapping.disagreement import FEWEST_POINTS, USUAL_SLIP, FloorMotion
 from robot_vision.mapping.ground_view import GroundView
 from robot_vision.mapping.pose import Pose
 
@@ -26,14 +28,13 @@ Gray = NDArray[np.uint8]
 Grid = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_FEWEST_POINTS = 12
 _WINDOW = (15, 15)
 _LANE = (14.0, 1.6)
 """Length and half width of the ground that is tracked, as multiples of the camera's height."""
-_PIXEL = 0.2
-"""How well a tracked point is placed, working pixels."""
 _NOISE = 0.8
 """Mean difference of two pictures of the same thing, grey levels."""
+_LOOSE_SLIP, _OUTRIGHT = 0.3, 0.15
+"""Standard deviation with which a slip is looked for, and the slip that is taken for one."""
 
 
 @dataclass(frozen=True)
@@ -120,17 +121,18 @@ class PlaneMotion:
         step = earlier.pose.to_here(pose)
         points, seen_at = self._track(earlier, gray, view, step, floor)
         # Odometry is believed to a per cent, unless the floor contradicts it outright.
-        loose = _disagreement(points, seen_at, earlier.view, view, step, _LOOSE_SLIP)
-        wrong = loose
-        if abs(loose.slip) < _OUTRIGHT:
-            wrong = _disagreement(points, seen_at, earlier.view, view, step, _USUAL[3])
-        held, here, corrected = _corrected(earlier.view, view, step, wrong)
+        motion = FloorMotion(points, seen_at, earlier.view, view, step)
+        loose = motion.disagreement(_LOOSE_SLIP)
+        wrong = motion.disagreement(USUAL_SLIP) if abs(loose.slip) < _OUTRIGHT else loose
+        corrected = wrong.righted(step)
+        held = _leaning(earlier.view, wrong.pitch - wrong.common, wrong.roll)
+        here = _leaning(view, -wrong.common)
         raised, mirrored, telling = self._sweep(earlier.gray, gray, held, here, view.top, corrected)
-        told, _, _ = _corrected(earlier.view, view, step, wrong._replace(common=0.0))
+        told = _leaning(earlier.view, wrong.pitch, wrong.roll)
         moved, _ = _over_the_floor(points, seen_at, told, view, step)
         _, rise = _over_the_floor(points, seen_at, held, here, corrected)
         travelled = float(np.hypot(step[0, 2], step[1, 2]))
-        slip = loose.slip if len(points) >= _FEWEST_POINTS else float("nan")
+        slip = loose.slip if len(points) >= FEWEST_POINTS else float("nan")
         return Parallax(
             raised,
             mirrored,
@@ -176,7 +178,7 @@ class PlaneMotion:
         here = np.ascontiguousarray(gray[top:])
         lane = floor.astype(np.uint8) * _lane(view)
         corners = cv2.goodFeaturesToTrack(here, self.points, 0.002, 5, mask=lane, blockSize=3)
-        if corners is None or len(corners) < _FEWEST_POINTS:
+        if corners is None or len(corners) < FEWEST_POINTS:
             return np.zeros((0, 2)), np.zeros((0, 2))
         way = earlier.view.matrix @ step @ view.inverse
         warped = _drawn(earlier.gray, way, top, here.shape)
@@ -199,26 +201,37 @@ class PlaneMotion:
         """
         here = gray[top:]
         size = (self.window, self.window)
-        planes = []
-        for share in (0.0, *self.heights):
-            way = _raised(before, share).matrix @ step @ _raised(view, share).inverse
-            planes.append(_drawn(earlier, way, top, here.shape))
+        shares = (0.0, *self.heights)
+        ways = before.planes(shares) @ step @ np.linalg.inv(view.planes(shares))
+        planes = [_drawn(earlier, way, top, here.shape) for way in ways]
         gain = float(here.mean()) / max(float(planes[0].mean()), 1.0)
         planes = [np.asarray(cv2.convertScaleAbs(plane, alpha=gain), np.uint8) for plane in planes]
-        costs = [cv2.boxFilter(cv2.absdiff(here, plane), cv2.CV_32F, size) + _NOISE for plane in planes]
-        above = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share > 0.0]
-        below = [cost for cost, share in zip(costs[1:], self.heights, strict=True) if share < 0.0]
-        raised, mirrored = (np.log(costs[0] / np.minimum.reduce(some)) for some in (above, below))
-        differs = cv2.boxFilter(cv2.absdiff(planes[0], planes[1]), cv2.CV_32F, size)
-        telling = np.log1p(differs / (2.0 * _NOISE))
-        outside = _drawn(
-            np.full(earlier.shape, 255, np.uint8), before.matrix @ step @ view.inverse, top, here.shape, 0
+        floor, *others = (cv2.boxFilter(cv2.absdiff(here, plane), cv2.CV_32F, size) for plane in planes)
+        above = [cost for cost, share in zip(others, self.heights, strict=True) if share > 0.0]
+        below = [cost for cost, share in zip(others, self.heights, strict=True) if share < 0.0]
+        raised, mirrored = (
+            _log((floor + _NOISE) / (np.asarray(reduce(cv2.min, some), np.float32) + _NOISE))
+            for some in (above, below)
         )
+        differs = np.asarray(cv2.boxFilter(cv2.absdiff(planes[0], planes[1]), cv2.CV_32F, size), np.float32)
+        telling = _log(1.0 + differs / (2.0 * _NOISE))
+        outside = _drawn(np.full(earlier.shape, 255, np.uint8), ways[0], top, here.shape, 0)
         unseen = cv2.erode(outside, np.ones(size, np.uint8)) < 255
         raised[unseen] = 0.0
         mirrored[unseen] = 0.0
         telling[unseen] = 0.0
         return raised, mirrored, telling
+
+
+def _log(values: Grid) -> Grid:
+    """Natural logarithm (H, W): that of OpenCV takes a quarter of the time."""
+    return np.asarray(cv2.log(values), np.float32)
+
+
+def _leaning(view: GroundView, pitch: float, roll: float = 0.0) -> GroundView:
+    """The view of a camera that leans by so much more, rad."""
+    camera = view.camera
+    return GroundView(replace(camera, pitch=camera.pitch + pitch, roll=camera.roll + roll), view.scale)
 
 
 def _flow(first: Gray, second: Gray, corners: Any) -> tuple[Any, Any]:
@@ -248,95 +261,6 @@ def _lane(view: GroundView) -> Gray:
     return lane
 
 
-class Disagreement(NamedTuple):
-    """By what the floor seems to move against odometry and horizon.
-
-    Roll, pitch and yaw (rad) of this picture are wrong by so much against those of the earlier one; the way is wrong
-    by the share `slip`, and by `aside` (m) across it.
-    """
-
-    roll: float
-    pitch: float
-    yaw: float
-    slip: float
-    aside: float
-    common: float = 0.0
-    common_sigma: float = float("inf")
-
-
-_USUAL = (0.004, 0.01, 0.01, 0.01, 0.02, 0.05)
-"""Standard deviations of what may be wrong, where the floor shows nothing of it."""
-_LOOSE_SLIP, _OUTRIGHT = 0.3, 0.15
-"""Standard deviation with which a slip is looked for, and the slip that is taken for one."""
-
-
-def _disagreement(
-    points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array, slip: float
-) -> Disagreement:
-    """What is wrong with odometry and horizon, from points (N, 2) that are mostly floor; `slip` is how much usually is.
-
-    A pitch wrong by d moves the floor at (X, Y) by d (X^2 + H^2) / H along and d X Y / H aside, a roll by the same
-    with X and Y changed, a yaw by d (-Y, X). A pitch that is wrong in both pictures makes way that grows with
-    distance, a slip the same way everywhere. Robust least squares (Cauchy).
-    """
-    if len(points) < _FEWEST_POINTS:
-        return Disagreement(0.0, 0.0, 0.0, 0.0, 0.0)
-    camera = view.camera
-    height = camera.height_m or 1.0
-    here = np.column_stack(view.ground(points[:, 0], points[:, 1]))
-    there = np.column_stack(before.ground(seen_at[:, 0], seen_at[:, 1]))
-    turn, shift = step[:2, :2], step[:2, 2]
-    onward = turn.T @ shift
-    error = (there - shift) @ turn - here
-    x, y = here[:, 0] - camera.x_m, here[:, 1]
-    good = np.isfinite(error).all(axis=1) & np.isfinite(x)
-    error, x, y = error[good], x[good], y[good]
-    square, one = height**2, np.ones_like(x)
-    along = np.column_stack(
-        [-x * y, x**2 + square, height * y, -height * onward[0] * one, height * onward[1] * one]
-    )
-    aside = np.column_stack(
-        [-(y**2) - square, x * y, -height * x, -height * onward[1] * one, -height * onward[0] * one]
-    )
-    xp, yp = there[good, 0] - camera.x_m, there[good, 1]
-    common = np.column_stack([-(xp**2 - x**2), -(xp * yp - x * y)]) @ turn
-    terms = np.concatenate([np.stack([along, aside], axis=1), common[:, :, None]], axis=2) / height
-    terms[:, :, 4] /= float(np.hypot(*onward))
-    ray = _PIXEL / (camera.fx * view.scale)
-    sigma = ray * np.stack([(x**2 + square) / height, np.sqrt(x**2 + square)], axis=1)
-    usual = np.array(_USUAL)
-    usual[3] = slip
-    prior = np.diag(1.0 / usual**2)
-    information, unknown, weight = prior, np.zeros(len(_USUAL)), np.ones(len(x))
-    for _ in range(6):
-        scaled = terms * (weight[:, None] / sigma**2)[:, :, None]
-        information = np.einsum("nci,ncj->ij", scaled, terms) + prior
-        unknown = np.linalg.solve(information, np.einsum("nci,nc->i", scaled, error))
-        rest = (error - terms @ unknown) / sigma
-        weight = 1.0 / (1.0 + (rest**2).sum(axis=1) / 8.0)
-    sigma_common = float(np.sqrt(np.linalg.inv(information)[5, 5]))
-    return Disagreement._make([*(float(value) for value in unknown), sigma_common])
-
-
-def _corrected(
-    before: GroundView, view: GroundView, step: Array, wrong: Disagreement
-) -> tuple[GroundView, GroundView, Array]:
-    """Both views and the way between them, with what is wrong put right."""
-    earlier = replace(
-        before.camera,
-        pitch=before.camera.pitch + wrong.pitch - wrong.common,
-        roll=before.camera.roll + wrong.roll,
-    )
-    later = replace(view.camera, pitch=view.camera.pitch - wrong.common)
-    cos, sin = np.cos(wrong.yaw), np.sin(wrong.yaw)
-    way = step[:2, 2]
-    aside = np.array([-way[1], way[0]]) / np.hypot(*way) * wrong.aside
-    better = step.copy()
-    better[:2, :2] = step[:2, :2] @ np.array([[cos, -sin], [sin, cos]]).T
-    better[:2, 2] = way * (1.0 - wrong.slip) - aside
-    return GroundView(earlier, before.scale), GroundView(later, view.scale), better
-
-
 def _over_the_floor(
     points: Array, seen_at: Array, before: GroundView, view: GroundView, step: Array
 ) -> tuple[Array, Array]:
@@ -354,12 +278,6 @@ def _over_the_floor(
     good = np.isfinite(rise)
     moved[~good], rise[~good] = 0.0, 0.0
     return moved, rise
-
-
-def _raised(view: GroundView, share: float) -> GroundView:
-    """The same view of a plane that lies a share of the camera's height above the floor."""
-    height = (view.camera.height_m or 1.0) * (1.0 - share)
-    return GroundView(replace(view.camera, height_m=height), view.scale)
 
 
 def _drawn(

@@ -67,7 +67,7 @@ class ShadowFinder:
             bgr: (H, W, 3) the part of the picture that may show floor.
             floor: (H, W) what of it is floor for certain.
         """
-        light = _LINEAR[bgr[floor]]
+        light = _LINEAR.take(np.compress(floor.ravel(), bgr.reshape(-1, 3), axis=0))
         if not len(light):
             return
         lit = np.quantile(light, 0.6, axis=0).astype(np.float32)
@@ -81,24 +81,24 @@ class ShadowFinder:
         """Which pixels (H, W) have the colour of floor in shadow; none before the floor's colour is known."""
         if self._floor is None:
             return np.zeros(bgr.shape[:2], bool)
-        left = _LINEAR[bgr] / np.maximum(self._floor, 1e-3)
-        blue, green, red = left[..., 0], left[..., 1], left[..., 2]
+        left = cv2.LUT(bgr, (_LINEAR[:, None] / np.maximum(self._floor, 1e-3))[None])
+        blue, green, red = (np.asarray(part, np.float32) for part in cv2.split(left))
         mean = (blue + green + red) / np.float32(3.0)
         spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
         dim = (mean > self.darkest) & (mean < self.lightest) & (spread < self.tint * mean)
         return np.asarray(dim & (red - blue < self.warmth * mean))
 
-    def find(self, bgr: Pixels, score: Scores, view: GroundView, parallax: Parallax | None) -> Mask:
+    def find(self, dim: Mask, score: Scores, view: GroundView, parallax: Parallax | None) -> Mask:
         """Which pixels (H, W) that do not look like floor, or hardly do, are floor in shadow.
 
         Args:
-            bgr: (H, W, 3) the part of the picture that shows ground.
+            dim: (H, W) what of the part of the picture that shows ground has the colour of floor in shadow.
             score: (H, W) positive for floor.
             view: of the ground in the working picture.
             parallax: of the same part, None without an earlier picture.
         """
         shadow = np.zeros(score.shape, bool)
-        dim = self.dim(bgr) & (score < self.doubt)
+        dim = dim & (score < self.doubt)
         stands = shadow if parallax is None else dim & (parallax.raised > self.stands)
         dim &= ~stands
         count, found, table, _ = cv2.connectedComponentsWithStats(dim.astype(np.uint8), connectivity=4)
@@ -109,11 +109,9 @@ class ShadowFinder:
         flat = stats[:, cv2.CC_STAT_TOP] > 2
         flat &= self._long_enough(stats, view)
         # Floor goes on behind a shadow; behind what stands at the foot of a wall there is the wall.
-        above = np.zeros(score.shape, bool)
-        above[:-2] = patches[2:] > 0
-        above &= patches == 0
         over = np.zeros_like(patches)
         over[:-2] = patches[2:]
+        above = (over > 0) & (patches == 0)
         edge, floor = (np.bincount(over[m], minlength=count) for m in (above, above & (score > 0.0)))
         flat &= floor > self.surrounded * edge
         if parallax is not None:
@@ -142,11 +140,12 @@ class ShadowFinder:
     @staticmethod
     def _lies(patches: NDArray[np.int32], count: int, parallax: Parallax) -> NDArray[np.float64]:
         """Share (N,) of what floor of their texture shows that patches show; nan where there is nothing to see."""
+        inside = patches > 0
+        number = patches[inside]
         telling, raised = (
-            np.bincount(patches.ravel(), part.ravel(), minlength=count)
-            for part in (parallax.telling, parallax.raised)
+            np.bincount(number, part[inside], minlength=count) for part in (parallax.telling, parallax.raised)
         )
-        size = np.maximum(np.bincount(patches.ravel(), minlength=count), 1)
+        size = np.maximum(np.bincount(number, minlength=count), 1)
         return np.where(telling / size > _TELLING, -raised / np.maximum(telling, 1e-6), np.nan)
 
 

@@ -29,7 +29,7 @@ def found(dark: list[tuple[slice, slice]], raised: Grid, telling: Grid, like_flo
         picture[part], score[part] = DIM, like_floor
     empty = np.zeros((0, 2))
     parallax = Parallax(raised, nothing, telling, 0.3, 0.0, 0.0, 0.01, empty, empty, np.zeros(0))
-    return finder.find(picture, score, VIEW, parallax)
+    return finder.find(finder.dim(picture), score, VIEW, parallax)
 
 
 def test_a_shadow_is_told_from_the_post_that_casts_it() -> None:

@@ -48,6 +48,15 @@ def test_the_view_agrees_with_the_ground_plane(scale: float, roll: float) -> Non
     assert np.isnan(view.ground(np.array([100.0]), above)).all()
 
 
+def test_a_plane_above_the_floor_is_seen_where_its_points_are() -> None:
+    camera = replace(CAMERA, roll=0.05, x_m=0.2)
+    share, places = 0.4, np.array([(1.5, 0.4), (3.0, -0.7), (6.0, 0.0)])
+    seen = np.column_stack([places, np.ones(3)]) @ GroundView(camera, 0.5).planes((0.0, share))[1].T
+    # A camera that stands as much lower sees the floor there.
+    lower = GroundView(replace(camera, height_m=(1.0 - share) * (camera.height_m or 0.0)), 0.5)
+    np.testing.assert_allclose(seen[:, :2] / seen[:, 2:], np.column_stack(lower.pixels(*places.T)), atol=1e-9)
+
+
 def test_the_floor_is_what_the_sample_looks_like() -> None:
     appearance = FloorAppearance()
     random = np.random.default_rng(1)
