@@ -43,10 +43,9 @@ Mask = NDArray[np.bool_]
 
 #: Standard deviation of roll and pitch where no rows tell them, rad.
 _UNSEEN_LEAN = 0.02
-#: Where the crop closes its own leaves stand out: a plant of its colour is known once so many pictures have shown
-#: it, as tips of leaves come and go, and a weed is smaller than this share of the radius of a usual plant, as whole
-#: branches are not.
-_SURE_AGE, _SMALL = 5, 0.35
+#: Where the crop closes plants are cut out of its leaves, at first in other places: larger ones than this share of
+#: the radius of a usual plant are known once so many pictures have shown them, and are no weeds of its colour.
+_SMALL, _SURE_AGE = 0.35, 5
 #: Share of a picture's word on how large plants are.
 _SLOWLY = 0.1
 #: Difference in the logarithm of the area that doubles the variance of a place.
@@ -218,18 +217,18 @@ class PlantMap:
     def _told(self, lane: LaneHeading | None, spacing: float) -> Plants:
         """The plants that are known, as seen from the robot."""
         tracks = self.tracks
+        large = tracks.radii > _SMALL * (self.radius or np.inf)
         known = tracks.ages >= (1 if self._blind else KNOWN_AGE)
         if self._closes and not self._blind:
-            known &= (tracks.ages >= _SURE_AGE) | (tracks.foreign >= FOREIGN)
+            known &= ~large | (tracks.ages >= _SURE_AGE)
         cosine, sine = np.cos(self.pose.yaw), np.sin(self.pose.yaw)
         to_base = np.array([[cosine, sine], [-sine, cosine]])
         field_places = tracks.states[known, :2]
         places = (field_places - (self.pose.x, self.pose.y)) @ to_base.T
         log_areas, foreign = tracks.log_areas[known], tracks.foreign[known]
         covariance = np.asarray(to_base @ tracks.covariances[known, :2, :2] @ to_base.T)
-        radii = np.sqrt(np.exp(log_areas) / np.pi)
-        large = radii > _SMALL * (self.radius or np.inf)
-        covariance += stem_noise(radii, large & self._closes)
+        large = large[known]
+        covariance += stem_noise(tracks.radii[known], large & self._closes)
         if self.shift is not None:
             covariance += pose_noise(places, self.shift)
         weed = np.full(len(places), np.nan)
@@ -240,8 +239,7 @@ class PlantMap:
         kinds = np.full(len(places), PlantKind.UNSURE, np.uint8)
         kinds[weed > self.sure] = PlantKind.WEED
         if self._closes:
-            own = foreign < FOREIGN
-            kinds[own & (large | (tracks.ages[known] < _SURE_AGE))] = PlantKind.UNSURE
+            kinds[(foreign < FOREIGN) & large] = PlantKind.UNSURE
         kinds[weed < 0.5] = PlantKind.CROP
         return Plants(
             tracks.ids[known],
@@ -259,10 +257,12 @@ class PlantMap:
         """Match the plants of a window with those that are known, and correct these."""
         assert camera.height_m is not None
         self._height = camera.height_m
-        alike = (self.tracks.ages >= KNOWN_AGE) & (self.tracks.foreign < FOREIGN)
-        known = self.tracks.seen_from(self.pose, camera.x_m)[0][alike]
-        places = known * (window.fall / camera.height_m) + (camera.x_m, 0.0)
-        blobs = self.segmenter.cut(window, camera, lean, self.radius, places)
+        known = self.tracks.ages >= KNOWN_AGE
+        places = self.tracks.seen_from(self.pose, camera.x_m)[0] * (window.fall / camera.height_m)
+        places += (camera.x_m, 0.0)
+        alike = places[known & (self.tracks.foreign < FOREIGN)]
+        small = places[known & (self.tracks.radii < _SMALL * (self.radius or np.inf))]
+        blobs = self.segmenter.cut(window, camera, lean, self.radius, alike, small)
         height = camera.height_m
         self.shift = self._shift(blobs, camera)
         seen = height * self.shift.straightened(blobs.slopes)
@@ -273,6 +273,7 @@ class PlantMap:
         mine, theirs = matched(tracks, expected, spread, seen, noise, blobs, self.gate)
         whole = blobs.whole[theirs]
         tracks.missed[mine] = tracks.hidden[mine] = 0
+        tracks.ages[mine[~whole]] += 1
         mine, theirs = mine[whole], theirs[whole]
         # a blob larger or smaller than its plant has something of another, or lacks something
         size = np.log(blobs.areas[theirs]) - tracks.log_areas[mine] + 2.0 * tracks.states[mine, 2]
@@ -340,7 +341,7 @@ class PlantMap:
         new[taken] = False
         if len(self.tracks) and new.any():
             expected, _ = self.tracks.seen_from(self.pose, camera.x_m)
-            radius = np.sqrt(np.exp(self.tracks.log_areas) / np.pi)
+            radius = self.tracks.radii
             away = np.linalg.norm(seen[new][:, None, :] - expected[None, :, :], axis=2)
             strange = blobs.foreign[new] >= FOREIGN
             alike = ~strange[:, None] | (self.tracks.foreign >= FOREIGN)

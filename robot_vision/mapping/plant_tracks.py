@@ -82,6 +82,11 @@ class PlantTracks:
     def __len__(self) -> int:
         return len(self.ids)
 
+    @property
+    def radii(self) -> Array:
+        """Radii (N,) of circles as large as the plants, m."""
+        return np.asarray(np.sqrt(np.exp(self.log_areas) / np.pi))
+
     @staticmethod
     def none() -> PlantTracks:
         """No plant yet."""

@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 
 #: A nozzle is meant for a weed when its lane covers this share of the weed's radius about its middle, or so much, m.
 _AIM, _LEAST_AIM = 0.5, 0.008
-#: From what may be crop at least so many standard deviations of its place are kept.
-_CAUTION = 1.0
+#: From what may be crop at least so many standard deviations of its place are kept; fewer where its leaves were looked
+#: at, as from these the safety distance is kept as well.
+_CAUTION, _CAUTION_LEAVES = 1.0, 0.5
 #: Leaves this near to a weed's own circle may be its own; farther off than the other they do not matter, m.
 _OWN, _ASIDE = 0.012, 0.15
 #: Slower than this nobody can say when a weed comes under the nozzle, m/s.
@@ -153,11 +154,15 @@ class SprayPlanner:
         """
         half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
         unsure = np.maximum(np.linalg.det(plants.covariance), 0.0) ** 0.25
-        reach = plants.radii + np.maximum(self.safety, _CAUTION * unsure)
+        caution = _CAUTION if leaves is None else _CAUTION_LEAVES
+        reach = plants.radii + np.maximum(self.safety, caution * unsure)
         crop = plants.kinds != PlantKind.WEED
         places, reach = plants.places[crop], reach[crop]
         behind, before = self._kept_off(plants.places[weeds], places, reach)
-        if leaves is not None and len(leaves):
+        if leaves is not None and len(leaves) and len(weeds):
+            far = plants.radii[weeds].max() + _ASIDE
+            low, high = plants.places[weeds].min(axis=0) - far, plants.places[weeds].max(axis=0) + far
+            leaves = leaves[((leaves > low) & (leaves < high)).all(axis=1)]
             covered = _not_their_own(leaves, plants.places[weeds], plants.radii[weeds])
             for k, weed in enumerate(weeds):
                 place = plants.places[[weed]]

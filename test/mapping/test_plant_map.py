@@ -301,7 +301,7 @@ def test_touching_plants_are_cut_and_leaves_of_one_are_joined() -> None:
     plant_map = PlantMap()
     segmenter, lean = PlantSegmenter(), Lean(height=0.0)
     window = segmenter.look(plant_map.mask.of(scene.picture(pose)), CAMERA, lean)
-    blobs = segmenter.cut(window, CAMERA, lean, 0.06, np.zeros((0, 2)))
+    blobs = segmenter.cut(window, CAMERA, lean, 0.06, np.zeros((0, 2)), np.zeros((0, 2)))
     places = blobs.slopes * window.fall * (1.0 - TALL * 0.06 / HEIGHT)
     assert int((np.abs(places[:, 1]) < 0.1).sum()) == 12
     assert np.linalg.norm(places[:, None] - row[None], axis=2).min(axis=0).max() < 0.03

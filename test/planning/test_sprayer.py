@@ -160,3 +160,12 @@ def test_jets_keep_off_leaves_that_were_seen_but_for_those_of_the_weed() -> None
     assert whole.radii == pytest.approx([0.02])
     assert part.radii[0] < 0.02
     assert part.places[0, 0] < 0.6
+
+
+def test_where_leaves_were_looked_at_less_is_kept_from_a_plant_of_unsure_place() -> None:
+    planner = SprayPlanner(lanes=10, width=0.1, safety=0.03, margin=0.01)
+    near = plants((0.6, 0.25, 0.01, WEED), (0.6, 0.25 - 0.05 - 0.05 - 0.04, 0.05, CROP))
+    near.covariance[1] = 0.06**2 * np.eye(2)
+    for leaves, count in ((None, 0), ([0.6, 0.11], 1), ([0.6, 0.19], 0)):
+        seen = None if leaves is None else np.array([leaves])
+        assert len(planner.plan(near, 1.0, leaves=seen)) == count

@@ -18,6 +18,7 @@ from robot_vision.geometry import Camera
 from robot_vision.geometry.rotation import rotation_from_rpy
 from robot_vision.perception.crop_rows.ground_fit import lateral
 from robot_vision.perception.crop_rows.plant_bodies import bodies, cut_beside, cut_foreign
+from robot_vision.perception.crop_rows.plant_twins import twins
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -38,6 +39,9 @@ _SPARSE = 3
 _SOWN = 0.014
 #: Blobs larger than so many usual plants are cut.
 _TOO_LARGE = 2.2
+#: Where the crop closes, blobs up to so many radii of a usual plant may be weeds side by side; these are known to be
+#: several where known ones stand so many of the blob's own radii from their middle.
+_SMALL, _SEVERAL = 0.5, 0.5
 #: What is cut out of leaves by its colour is at least so many times as large as the smallest plant: light on single
 #: leaves comes and goes.
 _LEAST_FOREIGN = 3.0
@@ -178,7 +182,13 @@ class PlantSegmenter:
         return np.asarray(cv2.warpPerspective(picture, to_pixels, (columns, rows), flags=flags))
 
     def cut(
-        self, window: GroundWindow, camera: Camera, lean: Lean, radius: float | None, known: Array
+        self,
+        window: GroundWindow,
+        camera: Camera,
+        lean: Lean,
+        radius: float | None,
+        known: Array,
+        small: Array,
     ) -> Blobs:
         """Find the plants in a window.
 
@@ -189,6 +199,7 @@ class PlantSegmenter:
             radius: of a usual plant of the crop, m; None: not known, nothing is cut.
             known: (K, 2) where plants are expected in the window's plane, ahead and left of base_link, m: what has
                 been cut once is cut again, so that plants do not come and go.
+            small: (S, 2) likewise, small plants of whatever colour.
         """
         grown = (window.cells > 0).astype(np.uint8)
         reach = max(int(0.5 * self.join / self.side + 0.5), 1)
@@ -205,6 +216,8 @@ class PlantSegmenter:
                 count = cut_beside(joined, labels, count, radius / self.side, self.side, most)
                 label = labels[row, column].astype(np.intp)
             count, label = self._separated(window, labels, row, column, label, count, radius, known)
+            if window.closes:
+                count, label = self._side_by_side(window, labels, row, column, label, count, radius, small)
         amount = np.bincount(label, minlength=count).astype(np.float64)
         cut = np.bincount(label, window.cells[row, column] == _CUT, count) > 0.0
         edge = (row == len(grown) - 1) | (column == 0) | (column == grown.shape[1] - 1)
@@ -251,15 +264,57 @@ class PlantSegmenter:
         tops = tops[large[labels[tops[:, 0], tops[:, 1]]]]
         if not len(tops):
             return count, label
-        from robot_vision.perception.crop_rows.plant_kernels import share_among_seeds
+        return _shared(row, column, label, count, tops, labels[tops[:, 0], tops[:, 1]])
 
-        of = labels[tops[:, 0], tops[:, 1]]
-        order = np.argsort(of, kind="stable")
-        first = np.searchsorted(of[order], np.arange(count + 1))
-        names = np.arange(count, count + len(tops))
-        share_among_seeds(label, row, column, first, tops[order], names)
-        count += len(tops)
+    def _side_by_side(
+        self,
+        window: GroundWindow,
+        labels: NDArray[np.int32],
+        row: NDArray[np.intp],
+        column: NDArray[np.intp],
+        label: NDArray[np.intp],
+        count: int,
+        radius: float,
+        small: Array,
+    ) -> tuple[int, NDArray[np.intp]]:
+        """Cut small blobs that are several plants side by side, by those that are known, or by a waist."""
+        size = np.bincount(label, minlength=count)
+        most = np.pi * (_SMALL * radius / self.side) ** 2
+        index, inside = window.at(small)
+        seeds = index[inside]
+        of = labels[seeds[:, 0], seeds[:, 1]]
+        number = np.bincount(of, minlength=count)
+        total = np.stack([np.bincount(of, part, count) for part in seeds.T], axis=1)
+        middle = total / np.maximum(number, 1)[:, None]
+        apart = ((seeds - middle[of]) ** 2).sum(axis=1) > _SEVERAL**2 * size[of] / np.pi
+        several = (np.bincount(of, apart, count) > 1) & (size <= most)
+        several[0] = False
+        which, middles = twins(row, column, label, count, self.least_area / self.side**2, most)
+        new = ~several[which]
+        seeds = np.concatenate([seeds[several[of]], np.rint(middles[new]).astype(np.intp).reshape(-1, 2)])
+        return _shared(
+            row, column, label, count, seeds, np.concatenate([of[several[of]], np.repeat(which[new], 2)])
+        )
+
+
+def _shared(
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    label: NDArray[np.intp],
+    count: int,
+    seeds: NDArray[np.intp],
+    of: NDArray[np.integer[Any]],
+) -> tuple[int, NDArray[np.intp]]:
+    """Give each cell (N,) of blobs to the nearest of the seeds (M, 2), which lie in blobs (M,)."""
+    if not len(seeds):
         return count, label
+    from robot_vision.perception.crop_rows.plant_kernels import share_among_seeds
+
+    order = np.argsort(of, kind="stable")
+    first = np.searchsorted(of[order], np.arange(count + 1))
+    names = np.arange(count, count + len(seeds))
+    share_among_seeds(label, row, column, first, seeds[order], names)
+    return count + len(seeds), label
 
 
 def _disc(
