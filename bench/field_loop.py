@@ -58,7 +58,7 @@ def _table(drives: dict[str, list[Told]], count: int) -> Table:
             "offset after 3 m, RMS of the worst drive",
             "mm",
             [
-                Cell(1e3 * max(float(np.sqrt(np.mean(d.kept() ** 2))) for d in told))
+                Cell(1e3 * max(float(np.sqrt(np.mean(d.kept() ** 2))) for d in told if len(d.kept())))
                 for told in drives.values()
             ],
         ),
@@ -66,7 +66,7 @@ def _table(drives: dict[str, list[Told]], count: int) -> Table:
         row(
             "drives that changed row",
             "",
-            lambda told: sum(np.abs(drive.kept()).max() > 0.25 for drive in told),
+            lambda told: sum(np.abs(drive.kept()).max(initial=0.0) > 0.25 for drive in told),
             at_most(0.0),
             0,
         ),

@@ -167,6 +167,23 @@ def test_nothing_begins_with_rows_that_single_plants_contradict_and_it_is_said(
     assert doubted.lane is None
 
 
+def test_leaves_that_close_upon_each_other_are_no_open_ground() -> None:
+    """Where the crop closes, rows are told by the bare ground between; a stretch without any does not part them."""
+    field = drawn(Sown(offset=-0.04, radius=0.2, step=0.3))
+    far, near = (int(CAMERA.pixels(point)[0, 1]) for point in ahead_of(CAMERA, (5.0, 2.6)))
+    field[far:near] = drawn(Sown(radius=0.4))[far:near]
+    estimate = RowTracker(0.5).update(field, CAMERA, Motion(0.0))
+    assert estimate.lane is not None
+    assert estimate.lane.offset == pytest.approx(-0.04, abs=0.02)
+    assert math.sqrt(estimate.lane.yaw_variance) < math.radians(1.0)
+
+
+def ahead_of(camera: Camera, distances: tuple[float, ...]) -> list[np.ndarray]:
+    """Ground points (1, 3) straight ahead of the camera in its optical frame, m."""
+    eye = np.array([camera.x_m, 0.0, camera.height_m])
+    return [(np.array([[x, 0.0, 0.0]]) - eye) @ camera.optical_to_base for x in distances]
+
+
 def test_scattered_weeds_are_no_rows() -> None:
     weeds = drawn(Sown(missing=0.97))
     random = np.random.default_rng(3)

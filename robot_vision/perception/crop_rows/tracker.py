@@ -177,7 +177,7 @@ class RowTracker:
         )
         if self.row_filter.knows:
             told = self._where_rows_stand(told, camera)
-        rows, fault = self._fitted(picture, told, covered, camera)
+        rows, fault = self._fitted(picture, told, pieces if told.aside else told, covered, camera)
         if rows is None:
             return self._refuse(pieces, camera, motion, fault)
         expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
@@ -260,9 +260,9 @@ class RowTracker:
         return float(pieces.weight[here].sum()) / max(2.0 * half * (far - near), 1e-6)
 
     def _fitted(
-        self, picture: Picture, pieces: Pieces, covered: float, camera: Camera
+        self, picture: Picture, pieces: Pieces, plants: Pieces, covered: float, camera: Camera
     ) -> tuple[RowsOnGround | None, str]:
-        """Rows of this picture alone, or the reason why there are none."""
+        """Rows of this picture alone, by its pieces, those of plants or those between; or why there are none."""
         if covered < self.cover:
             return None, "hardly anything grows in this picture"
         if self.row_filter.knows:
@@ -275,7 +275,7 @@ class RowTracker:
             if pattern is None:
                 return None, "no rows stand out in this picture"
             start, bend = start_on_ground(pattern, camera, self.spacing), Curvature()
-        pieces = self._tied(pieces, camera, start)
+        pieces = self._tied(pieces, plants, camera, start)
         rows = self.fit.fit(pieces, camera, self.spacing, start, bend, tall_by_cover(covered))
         if rows is None:
             return None, "hardly anything grows before the robot"
@@ -291,11 +291,15 @@ class RowTracker:
             return None, "the rows lie as if the camera had been knocked over: look at camera.pitch and roll"
         return rows, ""
 
-    def _tied(self, pieces: Pieces, camera: Camera, start: Array) -> Pieces:
+    def _tied(self, pieces: Pieces, plants: Pieces, camera: Camera, start: Array) -> Pieces:
         """Leave out rows beyond open ground while it is not sure which of them goes on as which of those before it."""
-        along, aside = self._among_rows(pieces, camera, start)
+        grown, aside = self._among_rows(plants, camera, start)
         half, within = _SIDE_ROWS * self.spacing, self._strip(camera, start)
-        until = go_on_until(along, aside, pieces.weight, self.spacing, half, within)
+        if pieces.aside:
+            # Leaves that close stand in no rows to be seen, nor are they open ground
+            aside = np.where(np.abs(aside) < half, 0.0, aside)
+        until = go_on_until(grown, aside, plants.weight, self.spacing, half, within)
+        along = grown if plants is pieces else self._among_rows(pieces, camera, start)[0]
         here = along < until
         if self.row_filter.knows:
             here |= sideways(along, self._spread()) < _TIED * self.spacing
