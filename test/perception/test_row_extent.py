@@ -55,3 +55,8 @@ def test_a_gap_of_three_metres_is_no_end() -> None:
     assert seen(cover).end(0.0) is None
     cover[AHEAD > 3.0] = 0.0
     assert seen(cover).end(0.0) == pytest.approx(3.0, abs=0.01)
+
+
+def test_a_gap_between_thin_rows_and_dense_ones_is_no_end() -> None:
+    cover = np.where(AHEAD < 3.0, 0.09, np.where(AHEAD < 6.0, 0.0, 0.3))
+    assert seen(cover).end(4.5) is None

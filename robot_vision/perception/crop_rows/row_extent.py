@@ -20,7 +20,9 @@ ALONE = 8.0
 """Factor on what a picture can tell that has to speak for itself."""
 _WEIGHTS = np.array([0.25, 0.5, 0.25])
 _OPEN = 0.15
-"""Share of the usual cover that open ground has at most, all in all."""
+"""Share of the cover of rows before it that open ground has at most, all in all."""
+_GOES_ON = 0.5
+"""Share of the usual cover from which on rows go on, however little stands before: thin rows, a gap, dense ones."""
 _TAIL = 3
 """So many stretches of open ground may still hold the last plants of rows."""
 _LAST, _BEFORE = 4, 8
@@ -128,7 +130,13 @@ class RowExtent:
         looked_at = np.concatenate([[0], np.cumsum(known)])
         covered = np.concatenate([[0.0], np.cumsum(cover)])
         is_open = looked_at[begins + length] - looked_at[begins] == length
-        is_open &= covered[begins + length] - covered[begins] < _OPEN * usual * length
+        # Open is what grows far less than the rows before it: those behind a gap may be denser
+        before = np.maximum(begins - _BEFORE, 0)
+        dense = (covered[begins] - covered[before]) / np.maximum(looked_at[begins] - looked_at[before], 1)
+        dense = np.clip(dense, self.sparse * usual, usual)
+        is_open &= covered[begins + length] - covered[begins] < _OPEN * dense * length
+        go_on = np.concatenate([[0], np.cumsum(cover > _GOES_ON * usual)])
+        is_open &= go_on[begins + length] == go_on[begins + _TAIL]
         if not is_open.any():
             return None
         first = int(begins[is_open.argmax()])
