@@ -273,7 +273,10 @@ class PlantMap:
         mine, theirs = matched(tracks, expected, spread, seen, noise, blobs, self.gate)
         whole = blobs.whole[theirs]
         tracks.missed[mine] = tracks.hidden[mine] = 0
+        # what the border of the picture cuts is no plant less, but nobody knows how large it is
         tracks.ages[mine[~whole]] += 1
+        alone = np.ones(len(tracks), bool)
+        alone[mine] = False
         mine, theirs = mine[whole], theirs[whole]
         # a blob larger or smaller than its plant has something of another, or lacks something
         size = np.log(blobs.areas[theirs]) - tracks.log_areas[mine] + 2.0 * tracks.states[mine, 2]
@@ -290,8 +293,6 @@ class PlantMap:
         q = np.exp(tracks.states[mine, 2])
         areas = blobs.areas[theirs] * (q * np.exp(-lean.height)) ** 2
         tracks.see_looks(mine, areas, blobs.foreign[theirs])
-        alone = np.ones(len(tracks), bool)
-        alone[mine] = False
         places = expected * (window.fall / height) + (camera.x_m, 0.0)
         look_for(tracks, alone, places, window)
         self._begin(blobs, theirs, seen, noise, common, camera)

@@ -121,7 +121,7 @@ class ShadowFinder:
             # What hangs together with a thing that stands, as its skirting does, must look like shadow both ways,
             # or surely lie up to their upper rim, as the long shadow of a kerb does: what stands rises with its height.
             up_high = self._lies(np.where(_upper_rim(patches), patches, 0), count, parallax) > self.surely
-            told = np.where(joined & ~flat, up_high, lies > self.lying)
+            told = (lies > self.lying) & (flat | ~joined | up_high)
             flat = np.where(np.isnan(lies), flat & ~joined, told)
         flat[0] = False
         return np.asarray(flat[patches])

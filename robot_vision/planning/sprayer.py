@@ -154,10 +154,10 @@ class SprayPlanner:
         """
         half = np.repeat((plants.radii[weeds] + self.margin)[:, None], self.lanes, axis=1)
         unsure = np.maximum(np.linalg.det(plants.covariance), 0.0) ** 0.25
-        caution = _CAUTION if leaves is None else _CAUTION_LEAVES
-        reach = plants.radii + np.maximum(self.safety, caution * unsure)
         crop = plants.kinds != PlantKind.WEED
-        places, reach = plants.places[crop], reach[crop]
+        places, radii = plants.places[crop], plants.radii[crop]
+        caution = np.where(_in_leaf(places, radii, leaves), _CAUTION_LEAVES, _CAUTION)
+        reach = radii + np.maximum(self.safety, caution * unsure[crop])
         behind, before = self._kept_off(plants.places[weeds], places, reach)
         if leaves is not None and len(leaves) and len(weeds):
             far = plants.radii[weeds].max() + _ASIDE
@@ -199,6 +199,16 @@ class SprayPlanner:
             number: Fate(fate)
             for number, fate in zip(plants.ids[there].tolist(), fates[there].tolist(), strict=True)
         }
+
+
+def _in_leaf(places: Array, radii: Array, leaves: Array | None) -> NDArray[np.bool_]:
+    """Whether leaves (L, 2) were seen within such radii (N,) of places (N, 2); None: nobody has looked."""
+    if leaves is None or not len(leaves):
+        return np.zeros(len(places), np.bool_)
+    near = [
+        bool((_square(leaves, place) < radius**2).any()) for place, radius in zip(places, radii, strict=True)
+    ]
+    return np.array(near, np.bool_)
 
 
 def _not_their_own(leaves: Array, weeds: Array, radii: Array) -> Array:

@@ -52,11 +52,19 @@ def test_floor_that_shadow_makes_doubtful_is_floor() -> None:
     assert shadow[SHADOW].all()
 
 
-@pytest.mark.parametrize(("shown", "is_shadow"), [(-0.3, True), (-0.1, False)])
-def test_a_strip_beside_what_stands_is_shadow_when_it_surely_lies(shown: float, is_shadow: bool) -> None:
-    """As the shadow of a kerb, which runs on along it for longer than things on the floor are deep."""
+@pytest.mark.parametrize(
+    ("rim", "below", "is_shadow"),
+    [(-0.3, -0.3, True), (-0.1, -0.1, False), (0.0, -0.45, False), (-0.45, 0.02, False)],
+)
+def test_a_strip_beside_what_stands_is_shadow_when_it_surely_lies(
+    rim: float, below: float, is_shadow: bool
+) -> None:
+    """As the shadow of a kerb, which runs on along it for longer than things on the floor are deep.
+
+    What stands rises with its height: skirtings lie at their feet only.
+    """
     raised, telling = np.zeros(SHAPE), np.full(SHAPE, 0.5)
     strip = np.s_[10:60, 80:84]
-    raised[POST], raised[strip] = 0.8, shown
+    raised[POST], raised[strip], raised[10:12, 80:84] = 0.8, below, rim
     shadow = found([POST, strip], raised, telling)
     assert shadow[strip].any() == is_shadow

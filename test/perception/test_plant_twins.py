@@ -89,3 +89,21 @@ def test_small_plants_that_are_known_stay_apart_where_they_grow_together() -> No
         blobs = PlantSegmenter().cut(window, camera, Lean(), 0.1, np.zeros((0, 2)), known)
         left = blobs.slopes[:, 1] * window.fall
         assert (left > corner[1] + side * 160).sum() == expected
+
+
+@pytest.mark.parametrize(("closes", "expected"), [(True, 2), (False, 1)])
+def test_small_plants_are_cut_at_their_waist_where_the_crop_closes(closes: bool, expected: int) -> None:
+    cells = np.zeros((120, 200), np.uint8)
+    if closes:
+        cells[:, :150] = 1
+    twin = rosette((50.0, 40.0), 8.0, 5) | rosette((66.0, 40.0), 8.0, 5)
+    cells[: len(twin), 140 : 140 + twin.shape[1]][twin[:, : cells.shape[1] - 140]] = 1
+    cells[:, 150:160] = 0
+    corner, side = np.array([0.7, -0.6]), 0.006
+    window = GroundWindow(cells, np.ones(cells.shape, bool), np.zeros(cells.shape, bool), corner, side, 1.2)
+    assert window.closes == closes
+    camera = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=1.4)
+    none = np.zeros((0, 2))
+    blobs = PlantSegmenter().cut(window, camera, Lean(), 0.12, none, none)
+    left = blobs.slopes[:, 1] * window.fall
+    assert (left > corner[1] + side * 160).sum() == expected

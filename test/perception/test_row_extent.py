@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows end where their last stems stand, not where their last leaves reach."""
+"""Rows end where their last stems stand, give or take half of what leaves reach beyond them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def seen(cover: NDArray[np.float64]) -> RowExtent:
 
 @pytest.mark.parametrize("end", [3.5, 3.6, 3.7])
 @pytest.mark.parametrize("reach", [0.05, 0.2, 0.35])
-def test_the_end_is_that_of_the_stems_whatever_the_leaves_reach(end: float, reach: float) -> None:
+def test_leaves_shift_the_end_by_no_more_than_half_of_their_reach(end: float, reach: float) -> None:
     assert seen(leaves(end, reach)).end(0.0) == pytest.approx(end, abs=0.17)
 
 

@@ -166,6 +166,6 @@ def test_where_leaves_were_looked_at_less_is_kept_from_a_plant_of_unsure_place()
     planner = SprayPlanner(lanes=10, width=0.1, safety=0.03, margin=0.01)
     near = plants((0.6, 0.25, 0.01, WEED), (0.6, 0.25 - 0.05 - 0.05 - 0.04, 0.05, CROP))
     near.covariance[1] = 0.06**2 * np.eye(2)
-    for leaves, count in ((None, 0), ([0.6, 0.11], 1), ([0.6, 0.19], 0)):
+    for leaves, count in ((None, 0), ([1.6, 0.4], 0), ([0.6, 0.11], 1), ([0.6, 0.19], 0)):
         seen = None if leaves is None else np.array([leaves])
         assert len(planner.plan(near, 1.0, leaves=seen)) == count

@@ -41,7 +41,7 @@ _SOWN = 0.014
 _TOO_LARGE = 2.2
 #: Where the crop closes, blobs up to so many radii of a usual plant may be weeds side by side; these are known to be
 #: several where known ones stand so many of the blob's own radii from their middle.
-_SMALL, _SEVERAL = 0.5, 0.5
+_MAY_BE_SEVERAL, _SEVERAL = 0.5, 0.5
 #: What is cut out of leaves by its colour is at least so many times as large as the smallest plant: light on single
 #: leaves comes and goes.
 _LEAST_FOREIGN = 3.0
@@ -199,7 +199,7 @@ class PlantSegmenter:
             radius: of a usual plant of the crop, m; None: not known, nothing is cut.
             known: (K, 2) where plants are expected in the window's plane, ahead and left of base_link, m: what has
                 been cut once is cut again, so that plants do not come and go.
-            small: (S, 2) likewise, small plants of whatever colour.
+            small: (S, 2) likewise, small plants of whatever colour; they count where the crop closes.
         """
         grown = (window.cells > 0).astype(np.uint8)
         reach = max(int(0.5 * self.join / self.side + 0.5), 1)
@@ -217,6 +217,7 @@ class PlantSegmenter:
                 label = labels[row, column].astype(np.intp)
             count, label = self._separated(window, labels, row, column, label, count, radius, known)
             if window.closes:
+                labels[row, column] = label
                 count, label = self._side_by_side(window, labels, row, column, label, count, radius, small)
         amount = np.bincount(label, minlength=count).astype(np.float64)
         cut = np.bincount(label, window.cells[row, column] == _CUT, count) > 0.0
@@ -279,7 +280,7 @@ class PlantSegmenter:
     ) -> tuple[int, NDArray[np.intp]]:
         """Cut small blobs that are several plants side by side, by those that are known, or by a waist."""
         size = np.bincount(label, minlength=count)
-        most = np.pi * (_SMALL * radius / self.side) ** 2
+        most = np.pi * (_MAY_BE_SEVERAL * radius / self.side) ** 2
         index, inside = window.at(small)
         seeds = index[inside]
         of = labels[seeds[:, 0], seeds[:, 1]]

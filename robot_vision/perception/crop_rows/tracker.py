@@ -175,9 +175,10 @@ class RowTracker:
             if covered < _CLOSED
             else between_plants(pieces_of(~mask, camera, cell, 0.5), pieces, camera)
         )
+        plants = pieces
         if self.row_filter.knows:
-            told = self._where_rows_stand(told, camera)
-        rows, fault = self._fitted(picture, told, pieces if told.aside else told, covered, camera)
+            told, plants = (self._where_rows_stand(some, camera) for some in (told, plants))
+        rows, fault = self._fitted(picture, told, plants, covered, camera)
         if rows is None:
             return self._refuse(pieces, camera, motion, fault)
         expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
@@ -262,7 +263,10 @@ class RowTracker:
     def _fitted(
         self, picture: Picture, pieces: Pieces, plants: Pieces, covered: float, camera: Camera
     ) -> tuple[RowsOnGround | None, str]:
-        """Rows of this picture alone, by its pieces, those of plants or those between; or why there are none."""
+        """Rows of this picture alone, fitted to pieces of plants or of the ground between, or why there are none.
+
+        The plants tell besides where open ground is.
+        """
         if covered < self.cover:
             return None, "hardly anything grows in this picture"
         if self.row_filter.knows:
@@ -299,7 +303,7 @@ class RowTracker:
             # Leaves that close stand in no rows to be seen, nor are they open ground
             aside = np.where(np.abs(aside) < half, 0.0, aside)
         until = go_on_until(grown, aside, plants.weight, self.spacing, half, within)
-        along = grown if plants is pieces else self._among_rows(pieces, camera, start)[0]
+        along = self._among_rows(pieces, camera, start)[0] if pieces.aside else grown
         here = along < until
         if self.row_filter.knows:
             here |= sideways(along, self._spread()) < _TIED * self.spacing
