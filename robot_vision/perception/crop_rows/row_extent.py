@@ -146,10 +146,10 @@ class RowExtent:
     def _sown_until(self, leaves_until: int, known: NDArray[np.bool_], usual: float) -> float:
         """Where the stems end, in stretches, when the last leaves end before stretch `leaves_until`.
 
-        The middle of two answers whose errors go opposite ways: the last metre of rows is as long as what grows there, were it to
-        stand as densely as in the metres before, which is too short where the last plants are small; and rows end
-        with the last stretch that is grown over at all, which is too long as leaves reach beyond the last stems and
-        tall ones are seen farther off than they are.
+        The middle of two answers whose errors go opposite ways: the last metre of rows is as long as what grows there,
+        were it to stand as densely as in the metres before, which is too short where the last plants are small; and
+        rows end with the last stretch that is grown over at all, which is too long as leaves reach beyond the last
+        stems and tall ones are seen farther off than they are.
         """
         cover = self._cover / np.maximum(self._seen, 1e-9)
         begin = max(leaves_until - _LAST, 0)
