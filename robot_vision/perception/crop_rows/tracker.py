@@ -177,7 +177,8 @@ class RowTracker:
         )
         plants = pieces
         if self.row_filter.knows:
-            told, plants = (self._where_rows_stand(some, camera) for some in (told, plants))
+            plants = self._where_rows_stand(pieces, camera)
+            told = self._where_rows_stand(told, camera) if told.aside else plants
         rows, fault = self._fitted(picture, told, plants, covered, camera)
         if rows is None:
             return self._refuse(pieces, camera, motion, fault)
