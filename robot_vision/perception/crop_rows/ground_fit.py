@@ -140,8 +140,8 @@ class GroundFit:
     ) -> RowsOnGround | None:
         """Fit rows from a start that is right to a third of a spacing at the robot's feet.
 
-        The curvature expected steadies the search; the answer and its covariance are without it, ready to be joined
-        with what is known.
+        The curvature expected steadies the search to its end; a last step then leaves it out, so that the answer and
+        its covariance are without it, ready to be joined with what is known.
 
         Args:
             pieces: of vegetation.
@@ -157,9 +157,8 @@ class GroundFit:
         values = np.array(start, np.float64)
         last = len(_SCHEDULE) - 1
         for number, (scale, far, aside) in enumerate(_SCHEDULE):
-            known = curvature if number < last - 1 else _ANY_CURVATURE
-            information, prior = self._prior(known, tall)
-            if known is curvature:
+            information, prior = self._prior(curvature, tall)
+            if number < last - 1:
                 # Weeds alone, as in a gap, must not lead astray what begins with the ground at the robot's feet
                 information[_PLACE, _PLACE] = _START_SIGMAS**-2.0
                 prior[_PLACE] = start[_PLACE]
@@ -169,11 +168,7 @@ class GroundFit:
                 continue
             residual, jacobian = _residuals(here, camera, values, spacing)
             trust = _trust(here.weight, residual, scale)
-            # Plants as wide as the scale pull less than they say, as one side of them pulls against the other
-            yields = float(np.clip(1.0 - trust @ (residual / scale) ** 2 / trust.sum(), _LEAST_YIELD, 1.0))
-            hessian = jacobian.T @ (trust[:, None] * jacobian) + information
-            gradient = jacobian.T @ (trust * residual) / yields + information @ (values - prior)
-            values = values - np.linalg.solve(hessian, gradient)
+            values = values - _step(residual, jacobian, trust, scale, information, values - prior)
         return self._judged(pieces, camera, values, spacing, tall)
 
     def _prior(self, curvature: Curvature, tall: tuple[float, float]) -> tuple[Array, Array]:
@@ -210,9 +205,9 @@ class GroundFit:
         scatter = float(np.average(middle**2, weights=amount)) + _LEAST_SCATTER**2
         clumps = float(amount.sum() ** 2 / (amount**2).sum())
         honest = clumps / scatter / float(trust.sum())
-        information = (
-            honest * (jacobian.T @ (trust[:, None] * jacobian)) + self._prior(_ANY_CURVATURE, tall)[0]
-        )
+        known, prior = self._prior(_ANY_CURVATURE, tall)
+        information = honest * (jacobian.T @ (trust[:, None] * jacobian)) + known
+        values = values - _step(residual, jacobian, trust, scale, known, values - prior)
         share = float(np.average(np.cos(2.0 * np.pi * residual / spacing), weights=here.weight))
         # The less of what grows stands in rows, the more the weeds have a say
         weedy = max(1.0, _USUAL_SHARE / max(share, 0.05)) ** 2
@@ -279,6 +274,17 @@ def _residuals(pieces: Pieces, camera: Camera, values: Array, spacing: float) ->
         moved[k] += _STEPS[k]
         jacobian[:, k] = (lateral(*ground_places(pieces.rays, camera, moved), moved)[0] - left) / _STEPS[k]
     return residual, jacobian
+
+
+def _step(
+    residual: Array, jacobian: Array, trust: Array, scale: float, information: Array, off: Array
+) -> Array:
+    """A step (6,) of the fit, to be taken off, from values that are off their prior by so much (6,)."""
+    # Plants as wide as the scale pull less than they say, as one side of them pulls against the other
+    yields = float(np.clip(1.0 - trust @ (residual / scale) ** 2 / trust.sum(), _LEAST_YIELD, 1.0))
+    hessian = jacobian.T @ (trust[:, None] * jacobian) + information
+    gradient = jacobian.T @ (trust * residual) / yields + information @ off
+    return np.asarray(np.linalg.solve(hessian, gradient))
 
 
 def _trust(weight: Array, residual: Array, scale: float) -> Array:
