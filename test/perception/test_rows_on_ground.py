@@ -56,6 +56,30 @@ def test_curvature_is_not_drawn_towards_straight_rows(curvature: float) -> None:
     assert abs(mean[1]) < 0.012
 
 
+@pytest.mark.parametrize(("curvature", "expected"), [(0.02, 0.015), (0.0, 0.004)])
+def test_the_curvature_expected_is_no_part_of_the_answer(curvature: float, expected: float) -> None:
+    for seed in range(3):
+        pieces = pieces_of(VegetationMask().of(drawn(Sown(curvature=curvature), CAMERA, seed)), CAMERA, 8)
+        start = np.array([0.02, -0.01, expected, 0.0, 0.0, 0.0])
+        rows = GroundFit().fit(pieces, CAMERA, 0.5, start, Curvature(expected, 5e-4), FLAT)
+        assert rows is not None
+        assert rows.values[2] == pytest.approx(curvature, abs=0.3 * abs(curvature - expected))
+
+
+def test_the_curvature_expected_steadies_what_few_metres_of_weedy_rows_tell() -> None:
+    errors = []
+    for seed in range(12):
+        sown = Sown(offset=0.03, yaw=-0.02, weeds=0.5, end=4.0)
+        pieces = pieces_of(VegetationMask().of(drawn(sown, CAMERA, seed)), CAMERA, 8)
+        start = np.array([sown.offset + 0.02, sown.yaw - 0.01, 0.0, 0.0, 0.0, 0.0])
+        rows = GroundFit().fit(pieces, CAMERA, sown.spacing, start, Curvature(0.0, 5e-4), FLAT)
+        assert rows is not None
+        # What it says of the offset to those who know that the rows are straight
+        toward = rows.covariance[0, 2] / rows.covariance[2, 2]
+        errors.append(rows.values[0] - toward * rows.values[2] - sown.offset)
+    assert float(np.sqrt(np.mean(np.square(errors)))) < 0.012
+
+
 def test_the_covariance_is_honest_with_weeds_and_missing_plants() -> None:
     squares = []
     for seed in range(12):

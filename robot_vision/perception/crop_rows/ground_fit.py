@@ -47,8 +47,9 @@ _CLUMP_M = 0.35
 #: Standard deviation of a plant about the line of its row, m.
 _SCATTER = 0.02
 #: Factor on the variance, for what leans all plants one way: wind, the sun, the slope; of what grows, and of the bare
-#: ground between, whose borders are the leaves of tall plants.
-_DOUBT = {0.0: 2.0, 0.5: 3.0}
+#: ground between, whose borders are the leaves of tall plants: leaves higher on one side look like a roll of the body
+#: by half a degree, which is a centimetre of offset.
+_DOUBT = {0.0: 2.0, 0.5: 8.0}
 #: Share of the vegetation that stands in rows, as a rule.
 _USUAL_SHARE = 0.5
 #: Of the middle of a clump, m: no field is sown better.

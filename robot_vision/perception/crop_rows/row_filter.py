@@ -57,7 +57,7 @@ class RowFilter:
         ValueError: naming the setting that makes no sense.
     """
 
-    shared: float = 0.6
+    shared: float = 0.8
     view: float = 1.2
     sidestep: float = 0.0025
     turn: float = 0.003
