@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 OFFSET, YAW, CURVATURE, ROLL, PITCH, HEIGHT = range(6)
 #: Steps of the numeric derivatives: m, rad, 1/m, rad, rad, share.
 _STEPS = np.array([1e-3, 1e-4, 1e-5, 1e-4, 1e-4, 1e-4])
+#: Rounds after these in which the curvature is let go, where it is so many standard deviations from what was expected.
+_FREED, _SURPRISE = 2, 3.0
 #: Rounds of the fit: distance at which a bit loses its say (in that of the last round), ground ahead and to each side
 #: that counts (in that of the last round).
 _SCHEDULE = (
@@ -170,7 +172,26 @@ class GroundFit:
             residual, jacobian = _residuals(here, camera, values, spacing)
             trust = _trust(here.weight, residual, scale)
             values = values - _step(residual, jacobian, trust, scale, information, values - prior)
+        told = self._judged(pieces, camera, values, spacing, tall)
+        if told is None or not _surprises(told, curvature):
+            return told
+        # rows that bend otherwise than expected were held to wrong places until the last step
+        values = told.values
+        for _ in range(_FREED):
+            here = self._in_view(pieces, camera, values, self.far, 0.6 * self.far)
+            if here is not None:
+                values = self._freed(here, camera, values, spacing, tall)
         return self._judged(pieces, camera, values, spacing, tall)
+
+    def _freed(
+        self, here: Pieces, camera: Camera, values: Array, spacing: float, tall: tuple[float, float]
+    ) -> Array:
+        """Values (6,) a step nearer to those of what is in view alone, whatever curvature was expected."""
+        known, prior = self._prior(_ANY_CURVATURE, tall)
+        residual, jacobian = _residuals(here, camera, values, spacing)
+        scale = self.narrow * spacing
+        trust = _trust(here.weight, residual, scale)
+        return values - _step(residual, jacobian, trust, scale, known, values - prior)
 
     def _prior(self, curvature: Curvature, tall: tuple[float, float]) -> tuple[Array, Array]:
         """Information (6, 6) and mean (6,) of what is known before."""
@@ -214,6 +235,12 @@ class GroundFit:
         weedy = max(1.0, _USUAL_SHARE / max(share, 0.05)) ** 2
         covariance = weedy * _DOUBT[here.aside] * np.linalg.inv(information)
         return RowsOnGround(values, 0.5 * (covariance + covariance.T), spacing, share, count)
+
+
+def _surprises(told: RowsOnGround, expected: Curvature) -> bool:
+    """Whether rows bend surely otherwise than was expected."""
+    sigma = float(np.sqrt(told.covariance[CURVATURE, CURVATURE]))
+    return abs(float(told.values[CURVATURE]) - expected.mean) > _SURPRISE * sigma
 
 
 def pieces_of(mask: NDArray[np.bool_], camera: Camera, cell: int, aside: float = 0.0) -> Pieces:
