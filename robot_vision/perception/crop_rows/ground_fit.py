@@ -21,8 +21,6 @@ Array = NDArray[np.float64]
 OFFSET, YAW, CURVATURE, ROLL, PITCH, HEIGHT = range(6)
 #: Steps of the numeric derivatives: m, rad, 1/m, rad, rad, share.
 _STEPS = np.array([1e-3, 1e-4, 1e-5, 1e-4, 1e-4, 1e-4])
-#: Rounds after these in which the curvature is let go, where it is so many standard deviations from what was expected.
-_FREED, _SURPRISE = 2, 3.0
 #: Rounds of the fit: distance at which a bit loses its say (in that of the last round), ground ahead and to each side
 #: that counts (in that of the last round).
 _SCHEDULE = (
@@ -37,6 +35,8 @@ _SCHEDULE = (
     (1.0, 1.0, 0.6),
     (1.0, 1.0, 0.6),
 )
+#: Rounds after these in which the curvature is let go, where it is so many standard deviations from what was expected.
+_FREED, _SURPRISE = 2, 3.0
 #: Rays that fall less than this, rad, meet the ground too far off.
 _LEAST_FALL = 0.06
 #: Fewer bits than this say nothing.
@@ -167,31 +167,19 @@ class GroundFit:
                 prior[_PLACE] = start[_PLACE]
             scale *= self.narrow * spacing
             here = self._in_view(pieces, camera, values, far * self.far, aside * self.far)
-            if here is None:
-                continue
-            residual, jacobian = _residuals(here, camera, values, spacing)
-            trust = _trust(here.weight, residual, scale)
-            values = values - _step(residual, jacobian, trust, scale, information, values - prior)
+            if here is not None:
+                values = _nearer(here, camera, values, spacing, scale, information, prior)
         told = self._judged(pieces, camera, values, spacing, tall)
         if told is None or not _surprises(told, curvature):
             return told
         # rows that bend otherwise than expected were held to wrong places until the last step
         values = told.values
+        known, anything = self._prior(_ANY_CURVATURE, tall)
         for _ in range(_FREED):
             here = self._in_view(pieces, camera, values, self.far, 0.6 * self.far)
             if here is not None:
-                values = self._freed(here, camera, values, spacing, tall)
+                values = _nearer(here, camera, values, spacing, self.narrow * spacing, known, anything)
         return self._judged(pieces, camera, values, spacing, tall)
-
-    def _freed(
-        self, here: Pieces, camera: Camera, values: Array, spacing: float, tall: tuple[float, float]
-    ) -> Array:
-        """Values (6,) a step nearer to those of what is in view alone, whatever curvature was expected."""
-        known, prior = self._prior(_ANY_CURVATURE, tall)
-        residual, jacobian = _residuals(here, camera, values, spacing)
-        scale = self.narrow * spacing
-        trust = _trust(here.weight, residual, scale)
-        return values - _step(residual, jacobian, trust, scale, known, values - prior)
 
     def _prior(self, curvature: Curvature, tall: tuple[float, float]) -> tuple[Array, Array]:
         """Information (6, 6) and mean (6,) of what is known before."""
@@ -302,6 +290,21 @@ def _residuals(pieces: Pieces, camera: Camera, values: Array, spacing: float) ->
         moved[k] += _STEPS[k]
         jacobian[:, k] = (lateral(*ground_places(pieces.rays, camera, moved), moved)[0] - left) / _STEPS[k]
     return residual, jacobian
+
+
+def _nearer(
+    here: Pieces,
+    camera: Camera,
+    values: Array,
+    spacing: float,
+    scale: float,
+    information: Array,
+    prior: Array,
+) -> Array:
+    """Values (6,) a round nearer to those of what is in view and of what is known before."""
+    residual, jacobian = _residuals(here, camera, values, spacing)
+    trust = _trust(here.weight, residual, scale)
+    return values - _step(residual, jacobian, trust, scale, information, values - prior)
 
 
 def _step(
