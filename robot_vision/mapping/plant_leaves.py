@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.mapping.pose import Pose
-from robot_vision.perception.crop_rows.plant_blobs import GroundWindow
+from robot_vision.perception.crop_rows.ground_window import GroundWindow
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.intp]

@@ -22,17 +22,12 @@ from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, S
 from robot_vision.mapping.plant_tracks import KNOWN_AGE, PlantTracks, Stature
 from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
-from robot_vision.perception.crop_rows.plant_blobs import (
-    Blobs,
-    GroundWindow,
-    Lean,
-    PlantSegmenter,
-    middle_of_rows,
-    row_radius,
-)
+from robot_vision.perception.crop_rows.ground_window import GroundWindow, Lean
+from robot_vision.perception.crop_rows.plant_blobs import Blobs, PlantSegmenter
 from robot_vision.perception.crop_rows.plant_bodies import FOREIGN
 from robot_vision.perception.crop_rows.plant_colours import CropColour
 from robot_vision.perception.crop_rows.row_filter import Motion
+from robot_vision.perception.crop_rows.row_looks import middle_of_rows, row_radius
 from robot_vision.perception.crop_rows.tracker import RowEstimate
 from robot_vision.perception.lane import LaneHeading
 from robot_vision.perception.vegetation import LeafMask, Picture

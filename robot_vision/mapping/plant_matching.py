@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from robot_vision.mapping.plant_shift import FORWARD, LEFT, PITCH, ROLL, TURN, Shift
 from robot_vision.mapping.plant_tracks import PlantTracks
-from robot_vision.perception.crop_rows.plant_blobs import Blobs, GroundWindow
+from robot_vision.perception.crop_rows.ground_window import GroundWindow
+from robot_vision.perception.crop_rows.plant_blobs import Blobs
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robot_vision.geometry import Camera
 from robot_vision.geometry.rotation import rotation_from_rpy
 from robot_vision.mapping.plants import PlantKind, Plants
-from robot_vision.perception.crop_rows.plant_blobs import Lean
+from robot_vision.perception.crop_rows.ground_window import Lean
 from robot_vision.planning.sprayer import Spray, SprayPlanner
 
 Picture = NDArray[Any]

@@ -8,7 +8,7 @@ import pytest
 
 from robot_vision.mapping.plant_leaves import CELL_M, LeafCover
 from robot_vision.mapping.pose import Pose
-from robot_vision.perception.crop_rows.plant_blobs import GroundWindow
+from robot_vision.perception.crop_rows.ground_window import GroundWindow
 
 SIDE, CORNER = 0.006, np.array([0.7, -0.6])
 

@@ -16,7 +16,8 @@ from robot_vision.mapping.plant_map import PlantMap
 from robot_vision.mapping.plant_shift import PITCH, ROLL, common_shift
 from robot_vision.mapping.plants import PlantKind, Plants
 from robot_vision.mapping.pose import Pose
-from robot_vision.perception.crop_rows.plant_blobs import Lean, PlantSegmenter
+from robot_vision.perception.crop_rows.ground_window import Lean
+from robot_vision.perception.crop_rows.plant_blobs import PlantSegmenter
 from robot_vision.perception.crop_rows.row_filter import Motion
 from robot_vision.perception.crop_rows.sensitivity import PRESETS
 from robot_vision.perception.vegetation import LeafMask

@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
-from robot_vision.perception.crop_rows.plant_blobs import GroundWindow, Lean, PlantSegmenter
+from robot_vision.perception.crop_rows.ground_window import GroundWindow, Lean
+from robot_vision.perception.crop_rows.plant_blobs import PlantSegmenter
 from robot_vision.perception.crop_rows.plant_twins import twins
 
 LEAST, MOST = 30.0, 4000.0
