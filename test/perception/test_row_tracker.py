@@ -57,13 +57,27 @@ def test_the_row_followed_is_the_one_nearest_to_the_robot() -> None:
 
 
 def test_the_end_of_the_rows_is_told_and_a_gap_is_driven_through() -> None:
-    ends = [estimate.end for estimate in along(RowTracker(0.5), Sown(end=4.5), 4)]
-    assert ends[-1] == pytest.approx(4.5 - 0.45, abs=0.5)
+    ends = [estimate.end for estimate in along(RowTracker(0.5), Sown(end=4.0), 4)]
+    assert ends[-1] == pytest.approx(4.0 - 0.45, abs=0.5)
     tracker = RowTracker(0.5)
     through = along(tracker, Sown(gap=(2.5, 5.5)), 26)
     assert all(estimate.end is None for estimate in through)
     assert all(estimate.lane is not None for estimate in through)
     assert abs(through[-1].lane.offset) < 0.03  # type: ignore[union-attr]
+
+
+def test_an_end_that_is_far_ahead_is_told_once_the_robot_is_nearer_or_to_who_asks_for_it() -> None:
+    near, far = (
+        [estimate.end for estimate in along(RowTracker(0.5, end_within=within), Sown(end=5.5), 15)]
+        for within in (4.0, 8.0)
+    )
+    truth = 5.5 - 0.15 * np.arange(15)
+    assert far[3] == pytest.approx(truth[3], abs=0.5)
+    told = np.array([math.nan if end is None else end for end in near])
+    assert np.isnan(told[truth > 4.5]).all()
+    assert np.isfinite(told[-1])
+    assert np.nanmax(told) <= 4.0
+    assert np.nanmax(np.abs(told - truth)) < 0.5
 
 
 def test_rows_that_lie_elsewhere_are_refused_at_first_and_believed_once_they_go_on_so() -> None:

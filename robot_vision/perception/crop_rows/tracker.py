@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_vision.geometry import Camera
+from robot_vision.perception.crop_rows.between_rows import between_plants
 from robot_vision.perception.crop_rows.detector import CropRowDetector
 from robot_vision.perception.crop_rows.ground_fit import (
     HEIGHT,
@@ -46,8 +47,6 @@ Array = NDArray[np.float64]
 _CELL_PX = 8
 #: Share of the ground covered from which on the bare ground between the rows is the rarer and tells more.
 _CLOSED = 0.4
-#: Length of a stretch of way (m), the farthest one, and the share of it that must be grown over to be of use.
-_STRETCH_M, _FARTHEST_M, _GROWN = 0.5, 40.0, 0.4
 #: Height and spacing contradict each other beyond this share and twice what plants may be high: one is not as given.
 _CONTRADICTION = 0.05
 #: Without odometry, after so many pictures in a row that fit no row the search begins anew.
@@ -71,7 +70,7 @@ class RowEstimate:
         reason: in plain words why there is no lane, or what is wrong with it; empty when all is well.
         seen: whether this picture shows the rows; else `lane` is carried on by odometry.
         rows: as this picture alone has them; None where it does not.
-        end: metres from the robot to where the rows end; None while no end is in sight.
+        end: metres from the robot to where the rows end; None while no end is near.
         fault: why the picture shows nothing at all, as at night; empty when it does.
     """
 
@@ -95,6 +94,7 @@ class RowTracker:
         row_filter: over time.
         dispute: between the filter and pictures that it refuses.
         extent: of the rows along the way.
+        end_within: an end farther ahead is not told, m: the last plants, few or small, are not all seen from there.
         coherence: least share of the vegetation that must stand in rows, 0 to 1.
         cover: least share of the ground that plants must cover.
 
@@ -109,6 +109,7 @@ class RowTracker:
     row_filter: RowFilter = field(default_factory=RowFilter)
     dispute: RowDispute = field(default_factory=RowDispute)
     extent: RowExtent = field(default_factory=RowExtent)
+    end_within: float = 4.0
     coherence: float = 0.12
     cover: float = 0.004
     _way: float = field(default=0.0, init=False, repr=False, compare=False)
@@ -121,6 +122,8 @@ class RowTracker:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.spacing) and self.spacing > 0.0):
             raise ValueError(f"spacing must be a positive number of metres, not {self.spacing}")
+        if not self.end_within > 0.0:
+            raise ValueError(f"end_within must be a positive number of metres, not {self.end_within}")
         for name in ("coherence", "cover"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} must lie in [0, 1), not {getattr(self, name)}")
@@ -193,7 +196,7 @@ class RowTracker:
         self._refused = 0
         self._unseen = 0.0
         self._look_along(pieces, camera, rows.values, rows.covariance[:3, :3], motion)
-        return RowEstimate(self._lane(), dissent, True, rows, self._end())
+        return RowEstimate(self._lane(), dissent, True, rows, self._told_end())
 
     def _refuse(self, pieces: Pieces, camera: Camera, motion: Motion, reason: str) -> RowEstimate:
         """The answer to a picture not believed: what stands along the way is noted where rows should be."""
@@ -232,6 +235,10 @@ class RowTracker:
 
     def _end(self) -> float | None:
         return self.extent.end(self._way, self._reach)
+
+    def _told_end(self) -> float | None:
+        end = self._end()
+        return None if end is None or end > self.end_within else end
 
     def _start(self) -> Array:
         """What a picture should show, (6,): as predicted, the body upright."""
@@ -352,28 +359,13 @@ class RowTracker:
         if not self.row_filter.knows:
             return RowEstimate(None, reason, False, None, None)
         self._refused += 1
-        end = self._end()
+        end = self._told_end()
         lane = self._lane()
         lost = self._unseen > self.extent.gap or (self._blind and self._refused > _MOST_REFUSED)
         if lane is None or lost:
             self.reset()
             return RowEstimate(None, f"{reason}; the row is lost", False, None, end)
         return RowEstimate(lane, reason, False, None, end)
-
-
-def between_plants(bare: Pieces, plants: Pieces, camera: Camera) -> Pieces:
-    """The bits of bare ground in stretches of the way where plants stand: not those of gaps and the headland."""
-    upright = np.zeros(6)
-    ahead = [
-        np.clip(ground_places(bits.rays, camera, upright)[0], 0.0, _FARTHEST_M) for bits in (bare, plants)
-    ]
-    stretch = [(x / _STRETCH_M).astype(np.int64) for x in ahead]
-    count = int(_FARTHEST_M / _STRETCH_M) + 1
-    open_area, grown = (
-        np.bincount(place, bits.weight, count) for place, bits in zip(stretch, (bare, plants), strict=True)
-    )
-    kept = (grown > _GROWN * (open_area + grown))[stretch[0]]
-    return Pieces(bare.rays[kept], bare.weight[kept], bare.aside)
 
 
 def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
