@@ -38,6 +38,17 @@ def test_small_plants_at_the_end_of_rows_are_still_rows() -> None:
     assert seen(cover).end(0.0) == pytest.approx(4.0, abs=0.5)
 
 
+def test_last_plants_that_are_faint_from_afar_are_told_from_nearby() -> None:
+    extent = RowExtent()
+    for way in 0.15 * np.arange(48):
+        there = AHEAD + way
+        faint = (there > 7.5) & (AHEAD > 2.0)
+        extent.see(way, AHEAD, np.where(there < 8.5, np.where(faint, 0.06, 0.2), 0.0), np.ones(len(AHEAD)))
+    told = extent.end(way)
+    assert told is not None
+    assert way + told == pytest.approx(8.5, abs=0.26)
+
+
 def test_a_last_metre_that_grows_denser_is_not_longer_than_its_leaves_reach() -> None:
     cover = leaves(3.5, 0.05)
     cover[(AHEAD > 2.5) & (AHEAD < 3.5)] *= 3.0

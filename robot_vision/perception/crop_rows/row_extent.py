@@ -25,6 +25,9 @@ _GOES_ON = 0.5
 """Share of the usual cover from which on rows go on, however little stands before: thin rows, a gap, dense ones."""
 _TAIL = 3
 """So many stretches of open ground may still hold the last plants of rows."""
+_NEARBY_M = 2.0
+"""For the last plants a picture counts the less the farther off it shows them, from here on: few or small ones are
+not all seen from afar."""
 _LAST, _BEFORE = 4, 8
 """Stretches that make up the last metre of rows, and those before it that tell how densely it is sown."""
 _GROWN = 0.2
@@ -74,6 +77,8 @@ class RowExtent:
         """Forget the way so far."""
         self._cover = np.zeros(_CELLS)
         self._seen = np.zeros(_CELLS)
+        self._near_cover = np.zeros(_CELLS)
+        self._near_seen = np.zeros(_CELLS)
         self._origin = -_BEHIND
 
     def see(self, way: float, ahead: Array, cover: Array, seen: Array) -> None:
@@ -87,14 +92,20 @@ class RowExtent:
         """
         gone = min(int(np.floor(way / CELL_M)) - _BEHIND - self._origin, _CELLS)
         if gone > 0:
-            for kept in (self._cover, self._seen):
+            for kept in (self._cover, self._seen, self._near_cover, self._near_seen):
                 kept[: _CELLS - gone] = kept[gone:]
                 kept[_CELLS - gone :] = 0.0
             self._origin += gone
         place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
         good = (place >= 0) & (place < _CELLS)
-        np.add.at(self._cover, place[good], seen[good] * cover[good])
-        np.add.at(self._seen, place[good], seen[good])
+        nearly = seen * _NEARBY_M / np.maximum(ahead, _NEARBY_M)
+        for total, part in (
+            (self._cover, seen * cover),
+            (self._seen, seen),
+            (self._near_cover, nearly * cover),
+            (self._near_seen, nearly),
+        ):
+            np.add.at(total, place[good], part[good])
 
     def is_open(self, way: float, ahead: Array) -> NDArray[np.bool_]:
         """Whether places so far ahead of the robot (N,), m, are known to be open ground: what grows there is weed."""
@@ -151,7 +162,7 @@ class RowExtent:
         rows end with the last stretch that is grown over at all, which is too long as leaves reach beyond the last
         stems and tall ones are seen farther off than they are.
         """
-        cover = self._cover / np.maximum(self._seen, 1e-9)
+        cover = self._near_cover / np.maximum(self._near_seen, 1e-9)
         begin = max(leaves_until - _LAST, 0)
         before = slice(max(begin - _BEFORE, 0), begin)
         dense = usual
