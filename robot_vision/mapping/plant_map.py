@@ -47,8 +47,8 @@ _SLOWLY = 0.1
 _AS_LARGE = 0.15
 #: Least and greatest height of the middle of a plant of the crop, in radii.
 _STATURES = 0.25, 1.2
-#: New plants keep so many radii of known ones from these, and small ones so many of their own: what is seen twice
-#: there is one plant.
+#: New plants keep so many radii of known ones from these, and where the crop closes small ones so many of their own:
+#: what is seen twice there is one plant.
 _OWN_GROUND, _OWN_SMALL = 0.5, 1.5
 
 
@@ -339,7 +339,8 @@ class PlantMap:
         if len(self.tracks) and new.any():
             expected, _ = self.tracks.seen_from(self.pose, camera.x_m)
             radius = np.sqrt(blobs.areas[new] / np.pi)
-            ground = np.where(radius < _SMALL * (self.radius or 0.0), _OWN_SMALL * radius, 0.0)
+            small = (radius < _SMALL * (self.radius or 0.0)) & self._closes
+            ground = np.where(small, _OWN_SMALL * radius, 0.0)
             ground = np.maximum(_OWN_GROUND * self.tracks.radii, ground[:, None])
             away = np.linalg.norm(seen[new][:, None, :] - expected[None, :, :], axis=2)
             strange = blobs.foreign[new] >= FOREIGN

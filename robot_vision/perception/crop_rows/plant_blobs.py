@@ -213,6 +213,8 @@ def _separate(cells: PlantCells, window: GroundWindow, radius: float, known: Arr
     tops = bodies(window.cells, radius)
     index, inside = window.at(known)
     seeds = index[inside]
+    # what has been cut off already is no seed, nor does it stand in the way of the body beside it
+    seeds = seeds[large[cells.at(seeds)]]
     if len(seeds):
         away = np.linalg.norm(tops[:, None, :] - seeds[None, :, :], axis=2).min(axis=1)
         tops = np.concatenate([seeds, tops[away > _NEW * radius]])

@@ -20,7 +20,8 @@ class PlantCells:
     Attributes:
         row: (N,) of the cells in the window.
         column: (N,) of them.
-        labels: int32 (rows, columns) number of the blob of each cell of the window, 0 where it is bare.
+        labels: int32 (rows, columns) number of the blob of each cell of the window, 0 where it is bare; between leaves
+            that belong together that of the blob before it was cut.
         count: of labels, the bare one included.
     """
 
@@ -38,7 +39,7 @@ class PlantCells:
             joined: likewise, and 1 in the cells between leaves that belong together.
         """
         count, components = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
-        row, column = np.nonzero(grown)
+        row, column = (np.ascontiguousarray(part) for part in np.nonzero(grown))
         return PlantCells(row, column, np.asarray(components, np.int32), count)
 
     @property

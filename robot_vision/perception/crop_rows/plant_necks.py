@@ -28,7 +28,7 @@ def cut_necks(
 ) -> NDArray[np.bool_]:
     """Cut small plants off large blobs on which they hang by a neck: each gets its own label.
 
-    A neck is what an erosion parts; what it parts grows back by as much (an opening by reconstruction).
+    A neck is what an erosion parts; what it parts grows back, a cell farther (an opening, part by part).
 
     Args:
         grown: (H, W) cells in which something grows, 1, and bare ones, 0.
@@ -38,18 +38,21 @@ def cut_necks(
         least: cells of the smallest plant that is cut off.
 
     Returns:
-        Which of the cells (N,) of `cells` now belong to what hung on others.
+        Which of the cells (N,) of `cells` now belong to what hung on others, of which a large blob is left.
     """
     near = min(max(int(_NEAR_M / side), 1), len(grown))
     labels = cells.labels[:near]
-    large = cells.sizes > np.pi * (_FROM * radius) ** 2
+    of, least_left = cells.label, np.pi * (_FROM * radius) ** 2
+    large = cells.sizes > least_left
     large[0] = False
     leaves = (large[labels] & (grown[:near] > 0)).astype(np.uint8)
     first, most = cells.count, np.pi * (_MOST * radius) ** 2
     for half in _NECKS_M:
         reach = max(int(half / side + 0.5), 1)
-        parts, of = cv2.connectedComponents(cv2.erode(leaves, _disc(reach)), connectivity=4, ltype=cv2.CV_16U)
-        part = np.asarray(of, np.uint16)
+        parts, eroded = cv2.connectedComponents(
+            cv2.erode(leaves, _disc(reach)), connectivity=4, ltype=cv2.CV_16U
+        )
+        part = np.asarray(eroded, np.uint16)
         core = np.bincount(part.ravel(), minlength=parts)
         small = (core >= _CORE) & (core <= most)
         small[0] = False
@@ -65,7 +68,7 @@ def cut_necks(
         labels[mine] = names[back[mine]]
         leaves[mine] = 0
         cells.count += int(own.sum())
-    return np.asarray(cells.label >= first)
+    return np.asarray((cells.label >= first) & (cells.sizes[of] > least_left))
 
 
 def _disc(reach: int) -> NDArray[np.uint8]:
