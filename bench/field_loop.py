@@ -46,6 +46,12 @@ def end_error(told: Told) -> float:
     return float(np.nanmax(np.abs(ends - LENGTH_M))) if np.isfinite(ends).any() else math.nan
 
 
+def told_from(told: Told) -> float:
+    """How far before the end of the rows one was first told, m; nan when it never was."""
+    known = np.flatnonzero(np.isfinite(told.ends))
+    return LENGTH_M - told.along[known[0]] if len(known) else math.nan
+
+
 def _kept(drive: Told) -> NDArray[np.float64]:
     """Offsets after settling, m; infinite for a drive that came to an end before."""
     offsets = drive.kept()
@@ -90,6 +96,11 @@ def _table(drives: dict[str, list[Told]], count: int) -> Table:
             lambda told: sum(d.stopped and d.along[-1] < LENGTH_M - SHORT_M for d in told),
             at_most(0),
             0,
+        ),
+        row(
+            "end of the rows, first told before it, median",
+            "m",
+            lambda told: np.nanmedian([*map(told_from, told)]),
         ),
         row(
             "end of the rows, median error", "m", lambda told: np.nanmedian([*map(end_error, told)]), digits=2

@@ -73,6 +73,11 @@ class CorridorSteering:
                 f"lean_slow must be less than lean_stop, {self.lean_stop} rad, not {self.lean_slow}"
             )
 
+    @property
+    def braking_way(self) -> float:
+        """Way before an obstacle at which to hear of it, m: from full speed, within the limit of braking."""
+        return self.stop_distance + 0.5 * self.speed**2 / self.most_acceleration
+
     def reset(self) -> None:
         """Stand still, as after a stop from outside or a clock that jumped."""
         self._last = Steering(0.0, 0.0)

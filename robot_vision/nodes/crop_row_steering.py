@@ -57,6 +57,8 @@ SPRAY_SETTINGS = (
 )
 OFFSET_TRUSTED_SPACINGS = 0.25  # who does not know in which row he is does not drive
 SPRAY_ADVICE = "look whether odometry comes, and whether the robot moves"
+#: The end of the rows is told so long before the robot must brake for it, s.
+TOLD_BEFORE_S = 0.5
 UNSEEN_ADVICE = "look at rows/overlay: are plants found, and do the rows drawn lie on them?"
 
 
@@ -68,7 +70,9 @@ class CropRowSteeringNode(SteeringNode):
         *CAMERA_PLACE,
         Setting("row.spacing", 0.5, "distance between rows, m", 0.05, 10.0),
         Setting("row.gap", 4.0, "longest gap in the rows; longer open ground is their end, m", 0.5, 20.0),
-        Setting("row.end_within", 4.0, "an end of the rows farther ahead is not told, m", 0.5, 50.0),
+        Setting(
+            "row.end_within", 4.0, "an end farther ahead is not told, unless to brake for it, m", 0.5, 50.0
+        ),
         Setting("row.bend", 0.0003, "how fast the curvature may change, 1/m per square root of m", 1e-6, 0.1),
         Setting("sensitivity", "medium", "how readily plants and rows are believed", choices=tuple(PRESETS)),
         Setting("vegetation", "auto", "what tells plants; auto takes grey as infrared", choices=INDICES),
@@ -121,10 +125,11 @@ class CropRowSteeringNode(SteeringNode):
         tracker.spacing, tracker.mask, tracker.fit = values["row.spacing"], mask, fit
         tracker.coherence, tracker.cover = preset.coherence, preset.cover
         tracker.extent.gap = values["row.gap"]
-        tracker.end_within = values["row.end_within"]
         tracker.row_filter.bend = values["row.bend"]
         for name, value in law.items():
             setattr(self._law, name, value)
+        heard_of = self._law.braking_way + TOLD_BEFORE_S * self._law.speed
+        tracker.end_within = max(values["row.end_within"], heard_of)
         self._configure_plants(values, preset.sure, preset.floor)
         super().configure(values)
 

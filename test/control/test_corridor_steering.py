@@ -82,6 +82,14 @@ def test_the_same_pictures_give_the_same_commands(pictures):
         assert first.update(lane, stamp, clearance) == second.update(lane, stamp, clearance)
 
 
+def test_who_hears_of_an_obstacle_at_the_braking_way_brakes_within_the_limit() -> None:
+    steering = CorridorSteering(speed=3.0, most_acceleration=0.5, stop_distance=1.0)
+    assert steering.braking_way == pytest.approx(10.0)
+    speed = steady(steering, LaneHeading(0.0, 1e-6, 0.0, 1e-6, 2.0)).speed
+    assert speed == pytest.approx(3.0, abs=0.02)
+    assert steering.update(LaneHeading(0.0, 1e-6, 0.0, 1e-6, 2.0), 1e3, steering.braking_way).speed > 2.9
+
+
 def steady(steering: CorridorSteering, lane: LaneHeading, clearance: float | None = None) -> Steering:
     """The command once the limits of acceleration no longer matter."""
     for k in range(100):
