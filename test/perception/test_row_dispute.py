@@ -15,8 +15,11 @@ SPACING = 0.5
 WRONG = np.array([-0.05, 0.04, -0.02])
 
 
-def taken_over_after(true: np.ndarray, speed: float, pictures: int) -> float | None:
-    """Way, m, after which a filter that began wrong gives way to pictures of the true rows; None: it does not."""
+def taken_over_after(true: np.ndarray, speed: float, pictures: int, held_every: int = 0) -> float | None:
+    """Way, m, after which a filter that began wrong gives way to pictures of the true rows; None: it does not.
+
+    In one of so many pictures, `held_every`, the search that begins where the filter is finds rows there.
+    """
     random, step = np.random.default_rng(0), Motion(0.1, speed, 0.0)
     row_filter, dispute = RowFilter(), RowDispute()
     row_filter.update(WRONG, SIGMA)
@@ -27,7 +30,10 @@ def taken_over_after(true: np.ndarray, speed: float, pictures: int) -> float | N
         if row_filter.update(measured, SIGMA):
             dispute.settle()
             continue
-        better = dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING)
+        held = held_every and number % held_every == 0
+        if held:
+            assert row_filter.update(row_filter.expected(), SIGMA)
+        better = dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, bool(held))
         if better is not None:
             assert better.expected()[:2] == pytest.approx(true[:2], abs=0.02)
             return (number + 1) * 0.1 * speed
@@ -38,6 +44,24 @@ def test_a_filter_that_began_wrong_gives_way_to_pictures_that_agree() -> None:
     way = taken_over_after(np.array([0.03, 0.0, 0.02]), speed=1.6, pictures=40)
     assert way is not None
     assert way < 2.5
+
+
+def test_a_filter_that_at_times_finds_what_it_looks_for_gives_way_too() -> None:
+    true = np.array([0.03, 0.0, 0.02])
+    assert taken_over_after(true, speed=1.6, pictures=40, held_every=3) is not None
+    assert taken_over_after(true, speed=1.6, pictures=40, held_every=1) is None
+
+
+def test_who_is_believed_where_the_refused_do_not_go_on_has_settled_the_dispute() -> None:
+    row_filter, dispute, step = RowFilter(), RowDispute(), Motion(0.1, 1.6, 0.0)
+    row_filter.update(WRONG, SIGMA)
+    assert not dispute.goes_on
+    for measured, believed, goes_on in (([0.08, 0.1, 0.0], False, True), (WRONG, True, False)):
+        row_filter.predict(step)
+        dispute.predict(step)
+        heard = dispute.hear(row_filter, np.array(measured), SIGMA, 1.0, SPACING, believed)
+        assert heard is None
+        assert dispute.goes_on == goes_on
 
 
 def test_the_next_row_never_takes_over() -> None:
@@ -56,7 +80,7 @@ def test_pictures_that_contradict_each_other_prove_nothing() -> None:
         dispute.predict(step)
         measured = np.array([0.08, 0.1 if number % 2 else -0.1, 0.0])
         assert not row_filter.update(measured, SIGMA)
-        assert dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING) is None
+        assert dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, False) is None
 
 
 def test_two_pictures_with_a_gap_between_prove_nothing() -> None:
@@ -67,7 +91,7 @@ def test_two_pictures_with_a_gap_between_prove_nothing() -> None:
         step = Motion(seconds, 1.6, 0.0)
         row_filter.predict(step)
         dispute.predict(step)
-        assert dispute.refused(row_filter, measured, SIGMA, 1.0, SPACING) is None
+        assert dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, False) is None
 
 
 @pytest.mark.parametrize("name", ["agreed", "pictures", "aside"])

@@ -20,8 +20,9 @@ _STEP_M = 0.5
 class RowDispute:
     """Gives the word to refused pictures once they agree with each other and odometry over a stretch of way.
 
-    A filter that began with a wrong picture is too sure of itself to take in right ones. What a few weeds in a gap look
-    like changes with each step; rows stay where they are.
+    A filter that began with a wrong picture is too sure of itself to take in right ones, and a search that begins where
+    it says may find there what it looks for. What a few weeds in a gap look like changes with each step; rows stay
+    where they are. The filter that refused keeps the word while it believes most of the pictures that agree.
 
     Args:
         agreed: way over which they must, m: by then other plants are seen than at its beginning.
@@ -39,6 +40,12 @@ class RowDispute:
     _way: float = field(default=0.0, init=False, repr=False, compare=False)
     _since: float = field(default=0.0, init=False, repr=False, compare=False)
     _count: int = field(default=0, init=False, repr=False, compare=False)
+    _refused: int = field(default=0, init=False, repr=False, compare=False)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether refused pictures are followed."""
+        return self._rival is not None
 
     def __post_init__(self) -> None:
         for name in ("agreed", "pictures", "aside"):
@@ -52,38 +59,55 @@ class RowDispute:
             self._since += (motion.speed or 0.0) * motion.seconds
 
     def settle(self) -> None:
-        """The filter has believed a picture: there is no dispute."""
+        """There is no dispute."""
         self._rival = None
         self._restart()
 
-    def refused(
-        self, row_filter: RowFilter, measured: Array, covariance: Array, doubt: float, spacing: float
+    def hear(
+        self,
+        row_filter: RowFilter,
+        measured: Array,
+        covariance: Array,
+        doubt: float,
+        spacing: float,
+        believed: bool,
     ) -> RowFilter | None:
-        """Take in what the filter refused; returns the filter to go on with instead, None when it stays.
+        """Take in what a picture says by itself; returns the filter to go on with instead, None when it stays.
 
         Args:
-            row_filter: that refused.
+            row_filter: that has the word.
             measured: as of `RowFilter.update`, as the next two.
             covariance: of it.
             doubt: factor on that.
             spacing: between rows, m.
+            believed: whether the filter believes the picture, as it understands it.
         """
         rival = self._rival
-        if rival is None or not rival.update(measured, covariance, doubt):
+        agrees = rival is not None and rival.update(measured, covariance, doubt)
+        if not agrees and believed:
+            self.settle()
+            return None
+        if not agrees:
             rival = replace(row_filter)
             self._rival = rival if rival.update(measured, covariance, doubt) else None
             self._restart()
             return None
+        assert rival is not None
         # Way without a picture that agrees, as across a gap, is none over which they have agreed
         self._way += min(self._since, _STEP_M)
         self._since = 0.0
         self._count += 1
+        self._refused += not believed
         off = abs(float(rival.expected()[OFFSET] - row_filter.expected()[OFFSET]))
         if self._way < self.agreed or self._count < self.pictures or off > self.aside * spacing:
+            return None
+        if 2 * self._refused < self._count:
+            self.settle()
             return None
         self.settle()
         rival.bend = row_filter.bend  # may have been set since
         return rival
 
     def _restart(self) -> None:
-        self._way, self._since, self._count = 0.0, 0.0, 0
+        self._way, self._since = 0.0, 0.0
+        self._count = self._refused = 0

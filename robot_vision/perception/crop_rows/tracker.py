@@ -94,7 +94,8 @@ class RowTracker:
         row_filter: over time.
         dispute: between the filter and pictures that it refuses.
         extent: of the rows along the way.
-        end_within: an end farther ahead is not told, m: the last plants, few or small, are not all seen from there.
+        end_within: an end farther ahead is not told, m: the last plants, few or small, are not all seen from there;
+            infinite: every end is told.
         coherence: least share of the vegetation that must stand in rows, 0 to 1.
         cover: least share of the ground that plants must cover.
 
@@ -182,14 +183,24 @@ class RowTracker:
         if self.row_filter.knows:
             plants = self._where_rows_stand(pieces, camera)
             told = self._where_rows_stand(told, camera) if told.aside else plants
-        rows, fault = self._fitted(picture, told, plants, covered, camera)
+
+        def look(anew: bool) -> tuple[RowsOnGround | None, str]:
+            return self._fitted(picture, told, plants, covered, camera, anew)
+
+        rows, fault = look(not self.row_filter.knows)
         if rows is None:
             return self._refuse(pieces, camera, motion, fault)
-        expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
-        rows = nearest_row(rows, expected)
+        rows = nearest_row(rows, self._expected_offset())
         dissent = self._dissent(pieces, rows, camera)
         doubt = _DISSENT if dissent else 1.0
-        if not self._believed(rows, doubt):
+        knew = self.row_filter.knows
+        believed = self.row_filter.update(*_told(rows), doubt)
+        if knew and (self.dispute.goes_on or not believed):
+            # A start that is wrong holds the fit to wrong rows: by itself the picture may say something else
+            better = self._disputed(look(True)[0], pieces, camera, believed)
+            if better is not None:
+                rows, dissent, doubt, believed = *better, True
+        if not believed:
             why = dissent or "what stands in this picture does not go on from the rows before"
             return self._refuse(pieces, camera, motion, why)
         rows = replace(rows, covariance=doubt * rows.covariance)
@@ -204,20 +215,24 @@ class RowTracker:
             self._look_along(pieces, camera, self._start(), self._spread(), motion)
         return self._without(reason)
 
-    def _believed(self, rows: RowsOnGround, doubt: float) -> bool:
-        """Whether the filter, or the one that takes its place, has taken in the rows of a picture."""
-        told = rows.values[:3], rows.covariance[:3, :3], doubt
-        if self.row_filter.update(*told):
-            self.dispute.settle()
-            return True
-        if not self.row_filter.knows:
-            return False
-        better = self.dispute.refused(self.row_filter, *told, self.spacing)
+    def _disputed(
+        self, rows: RowsOnGround | None, pieces: Pieces, camera: Camera, believed: bool
+    ) -> tuple[RowsOnGround, str, float] | None:
+        """Rows of a picture by itself, what speaks against them, and the doubt, where the filter gives way to them."""
+        if rows is None:
+            return None
+        rows = nearest_row(rows, self._expected_offset())
+        dissent = self._dissent(pieces, rows, camera)
+        doubt = _DISSENT if dissent else 1.0
+        better = self.dispute.hear(self.row_filter, *_told(rows), doubt, self.spacing, believed)
         if better is None:
-            return False
+            return None
         self.row_filter = better
         self.extent.reset()  # what was noted along the way was noted at the wrong place
-        return True
+        return rows, dissent, doubt
+
+    def _expected_offset(self) -> float:
+        return float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
 
     def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
         """What single plants (20.11)-(20.15) have against the rows fitted to all of them; empty when nothing."""
@@ -269,15 +284,15 @@ class RowTracker:
         return float(pieces.weight[here].sum()) / max(2.0 * half * (far - near), 1e-6)
 
     def _fitted(
-        self, picture: Picture, pieces: Pieces, plants: Pieces, covered: float, camera: Camera
+        self, picture: Picture, pieces: Pieces, plants: Pieces, covered: float, camera: Camera, anew: bool
     ) -> tuple[RowsOnGround | None, str]:
         """Rows of this picture alone, fitted to pieces of plants or of the ground between, or why there are none.
 
-        The plants tell besides where open ground is.
+        The plants tell besides where open ground is. Anew: the search starts without what is known.
         """
         if covered < self.cover:
             return None, "hardly anything grows in this picture"
-        if self.row_filter.knows:
+        if not anew:
             start = self._start()
             curvature = float(start[2])
             sigma = float(np.sqrt(self.row_filter.covariance[2, 2]))
@@ -287,7 +302,7 @@ class RowTracker:
             if pattern is None:
                 return None, "no rows stand out in this picture"
             start, bend = start_on_ground(pattern, camera, self.spacing), Curvature()
-        pieces = self._tied(pieces, plants, camera, start)
+        pieces = self._tied(pieces, plants, camera, start, anew)
         rows = self.fit.fit(pieces, camera, self.spacing, start, bend, tall_by_cover(covered))
         if rows is None:
             return None, "hardly anything grows before the robot"
@@ -303,7 +318,7 @@ class RowTracker:
             return None, "the rows lie as if the camera had been knocked over: look at camera.pitch and roll"
         return rows, ""
 
-    def _tied(self, pieces: Pieces, plants: Pieces, camera: Camera, start: Array) -> Pieces:
+    def _tied(self, pieces: Pieces, plants: Pieces, camera: Camera, start: Array, anew: bool) -> Pieces:
         """Leave out rows beyond open ground while it is not sure which of them goes on as which of those before it."""
         grown, aside = self._among_rows(plants, camera, start)
         half, within = _SIDE_ROWS * self.spacing, self._strip(camera, start)
@@ -313,7 +328,7 @@ class RowTracker:
         until = go_on_until(grown, aside, plants.weight, self.spacing, half, within)
         along = self._among_rows(pieces, camera, start)[0] if pieces.aside else grown
         here = along < until
-        if self.row_filter.knows:
+        if not anew:
             here |= sideways(along, self._spread()) < _TIED * self.spacing
         return Pieces(pieces.rays[here], pieces.weight[here], pieces.aside)
 
@@ -366,6 +381,11 @@ class RowTracker:
             self.reset()
             return RowEstimate(None, f"{reason}; the row is lost", False, None, end)
         return RowEstimate(lane, reason, False, None, end)
+
+
+def _told(rows: RowsOnGround) -> tuple[Array, Array]:
+    """What the filter hears of rows."""
+    return rows.values[:3], rows.covariance[:3, :3]
 
 
 def ground_in_view(camera: Camera, values: Array) -> tuple[float, float]:
