@@ -47,9 +47,8 @@ _SLOWLY = 0.1
 _AS_LARGE = 0.15
 #: Least and greatest height of the middle of a plant of the crop, in radii.
 _STATURES = 0.25, 1.2
-#: New plants keep so many radii of known ones from these, and where the crop closes small ones so many of their own:
-#: what is seen twice there is one plant.
-_OWN_GROUND, _OWN_SMALL = 0.5, 1.5
+#: New plants keep so many radii from known ones.
+_OWN_GROUND = 0.5
 
 
 @dataclass
@@ -338,14 +337,11 @@ class PlantMap:
         new[taken] = False
         if len(self.tracks) and new.any():
             expected, _ = self.tracks.seen_from(self.pose, camera.x_m)
-            radius = np.sqrt(blobs.areas[new] / np.pi)
-            small = (radius < _SMALL * (self.radius or 0.0)) & self._closes
-            ground = np.where(small, _OWN_SMALL * radius, 0.0)
-            ground = np.maximum(_OWN_GROUND * self.tracks.radii, ground[:, None])
+            radius = self.tracks.radii
             away = np.linalg.norm(seen[new][:, None, :] - expected[None, :, :], axis=2)
             strange = blobs.foreign[new] >= FOREIGN
             alike = ~strange[:, None] | (self.tracks.foreign >= FOREIGN)
-            new[np.flatnonzero(new)[((away < ground) & alike).any(axis=1)]] = False
+            new[np.flatnonzero(new)[((away < _OWN_GROUND * radius) & alike).any(axis=1)]] = False
         count = int(new.sum())
         if count:
             self.tracks.begin(
@@ -355,7 +351,6 @@ class PlantMap:
                 common[new],
                 blobs.areas[new] * np.exp(-2.0 * blobs.lean.height),
                 blobs.foreign[new],
-                blobs.hanging[new],
                 self.pose,
                 camera.x_m,
                 camera.height_m,

@@ -24,9 +24,6 @@ Array = NDArray[np.float64]
 #: Height of the middle of any plant and its standard deviation, in radii; the latter of plants of the crop, which are
 #: those larger than a share of a usual one.
 _TALL, _TALL_SIGMA, _CROP_SIGMA, _ALIKE = 0.6, 0.35, 0.15, 0.5
-#: Height of the middle of what hung on leaves of the crop, and its standard deviation, in heights of the middle of
-#: these: it may be one of them.
-_HANGS, _HANGS_SIGMA = 0.4, 0.4
 #: Least standard deviation of the logarithm of q.
 _LEAST_SIGMA = 0.004
 #: A plant is known once so many pictures have shown it.
@@ -49,13 +46,11 @@ class Stature:
     radius: float | None = None
     crop: float = 0.6
 
-    def of(self, radii: Array, hanging: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Height of the middle of plants (N,) and its standard deviation (N,), m; `hanging` as of `Blobs`."""
+    def of(self, radii: Array) -> tuple[Array, Array]:
+        """Height of the middle of plants (N,) and its standard deviation (N,), m."""
         alike = radii > (np.inf if self.radius is None else _ALIKE * self.radius)
-        tall = radii * np.where(alike, self.crop, _TALL)
-        unsure = radii * np.where(alike, _CROP_SIGMA, _TALL_SIGMA)
-        leaves = self.crop * (self.radius or 0.0)
-        return np.where(hanging, _HANGS * leaves, tall), np.where(hanging, _HANGS_SIGMA * leaves, unsure)
+        tall = np.where(alike, self.crop, _TALL)
+        return radii * tall, radii * np.where(alike, _CROP_SIGMA, _TALL_SIGMA)
 
 
 @dataclass
@@ -181,7 +176,6 @@ class PlantTracks:
         common: Array,
         areas: Array,
         foreign: Array,
-        hanging: NDArray[np.bool_],
         pose: Pose,
         camera_x: float,
         height: float,
@@ -196,7 +190,6 @@ class PlantTracks:
             common: (M, 2, 2) what the common error does to it, m a standard deviation.
             areas: (M,) as they appear on the ground, m^2.
             foreign: (M,) share of them that has another colour than the crop.
-            hanging: (M,) as of `Blobs`.
             pose: of the robot in the field.
             camera_x: of the camera ahead of base_link, m.
             height: of the camera, m.
@@ -204,7 +197,7 @@ class PlantTracks:
         """
         count = len(seen)
         radius = np.sqrt(areas / np.pi)
-        tall, unsure = stature.of(radius, hanging)
+        tall, unsure = stature.of(radius)
         log_q = np.log(np.maximum(1.0 - tall / height, 0.5))
         sigma = np.hypot(unsure / height, _LEAST_SIGMA)
         q = np.exp(log_q)

@@ -24,7 +24,6 @@ from robot_vision.perception.crop_rows.ground_window import (
 )
 from robot_vision.perception.crop_rows.plant_bodies import bodies, cut_beside, cut_foreign
 from robot_vision.perception.crop_rows.plant_cells import PlantCells
-from robot_vision.perception.crop_rows.plant_necks import cut_necks
 from robot_vision.perception.crop_rows.plant_twins import twins
 
 Array = NDArray[np.float64]
@@ -42,8 +41,6 @@ _MAY_BE_SEVERAL, _SEVERAL = 0.5, 0.5
 #: What is cut out of leaves by its colour is at least so many times as large as the smallest plant: light on single
 #: leaves comes and goes.
 _LEAST_FOREIGN = 3.0
-#: The same of what is cut off leaves by its neck.
-_LEAST_HANGING = 2.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,6 @@ class Blobs:
         whole: (N,) whether all of it is in the picture.
         lean: the one taken.
         foreign: (N,) share of each that has another colour than the crop.
-        hanging: (N,) whether it hung on larger leaves by a neck: a weed below them, or one of them.
     """
 
     slopes: Array
@@ -65,7 +61,6 @@ class Blobs:
     whole: Mask
     lean: Lean
     foreign: Array
-    hanging: Mask
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -164,22 +159,17 @@ class PlantSegmenter:
         cells = PlantCells.of(grown, joined)
         least = self.least_area / self.side**2
         cells.count = cut_foreign(window.foreign, cells.labels, cells.count, _LEAST_FOREIGN * least)
-        hanging = np.zeros(len(cells.row), np.bool_)
         if radius is not None:
             size = radius / self.side
-            if window.closes:
-                hanging = cut_necks(joined, cells, size, self.side, _LEAST_HANGING * least)
-            else:
+            if not window.closes:
                 most = _TOO_LARGE * np.pi * size**2
                 cells.count = cut_beside(joined, cells.labels, cells.count, size, self.side, most)
             _separate(cells, window, size, known)
             if window.closes:
                 _part_side_by_side(cells, window, size, small, least)
-        return self._blobs(cells, hanging, window, camera, lean)
+        return self._blobs(cells, window, camera, lean)
 
-    def _blobs(
-        self, cells: PlantCells, hanging: Mask, window: GroundWindow, camera: Camera, lean: Lean
-    ) -> Blobs:
+    def _blobs(self, cells: PlantCells, window: GroundWindow, camera: Camera, lean: Lean) -> Blobs:
         """What stands on its own now."""
         row, column, label, count = cells.row, cells.column, cells.label, cells.count
         amount = np.bincount(label, minlength=count).astype(np.float64)
@@ -193,8 +183,7 @@ class PlantSegmenter:
         slopes = (places - np.array([camera.x_m, 0.0])) / window.fall
         areas = np.minimum(amount, _disc(cells, label, middle, slopes, amount)) * self.side**2
         strange = np.bincount(label, window.foreign[row, column], count) / amount
-        hung = np.bincount(label, hanging, count) > 0.0
-        return Blobs(slopes[kept], areas[kept], ~cut[kept], lean, strange[kept], hung[kept])
+        return Blobs(slopes[kept], areas[kept], ~cut[kept], lean, strange[kept])
 
     def warm_up(self) -> None:
         """Load or compile the kernel, so that the first picture is not kept waiting."""
