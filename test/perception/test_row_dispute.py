@@ -33,6 +33,7 @@ def taken_over_after(true: np.ndarray, speed: float, pictures: int, held_every: 
         held = held_every and number % held_every == 0
         if held:
             assert row_filter.update(row_filter.expected(), SIGMA)
+            dispute.trust()
         better = dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, bool(held))
         if better is not None:
             assert better.expected()[:2] == pytest.approx(true[:2], abs=0.02)
@@ -50,6 +51,20 @@ def test_a_filter_that_at_times_finds_what_it_looks_for_gives_way_too() -> None:
     true = np.array([0.03, 0.0, 0.02])
     assert taken_over_after(true, speed=1.6, pictures=40, held_every=3) is not None
     assert taken_over_after(true, speed=1.6, pictures=40, held_every=1) is None
+
+
+def test_a_filter_that_has_believed_many_pictures_of_late_has_credit() -> None:
+    row_filter, dispute, step = RowFilter(), RowDispute(), Motion(0.1, 1.6, 0.0)
+    row_filter.update(WRONG, SIGMA)
+    for _ in range(20):
+        dispute.trust()
+    measured, ways = np.array([0.03, 0.0, 0.02]), []
+    for number in range(30):
+        row_filter.predict(step)
+        dispute.predict(step)
+        if dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, False) is not None:
+            ways.append(0.16 * number)
+    assert 1.5 < ways[0] < 4.0
 
 
 def test_who_is_believed_where_the_refused_do_not_go_on_has_settled_the_dispute() -> None:

@@ -12,6 +12,8 @@ from robot_vision.perception.crop_rows.row_filter import OFFSET, Motion, RowFilt
 
 Array = NDArray[np.float64]
 
+_CREDIT_M = 3.0
+"""Way over which the credit of a filter fades."""
 _STEP_M = 0.5
 """Way from one picture that agrees to the next that counts at most."""
 
@@ -22,7 +24,8 @@ class RowDispute:
 
     A filter that began with a wrong picture is too sure of itself to take in right ones, and a search that begins where
     it says may find there what it looks for. What a few weeds in a gap look like changes with each step; rows stay
-    where they are. The filter that refused keeps the word while it believes most of the pictures that agree.
+    where they are. A filter has credit, the number of pictures that it has believed of late: it keeps the word until it
+    has refused more that agree than that.
 
     Args:
         agreed: way over which they must, m: by then other plants are seen than at its beginning.
@@ -41,6 +44,7 @@ class RowDispute:
     _since: float = field(default=0.0, init=False, repr=False, compare=False)
     _count: int = field(default=0, init=False, repr=False, compare=False)
     _refused: int = field(default=0, init=False, repr=False, compare=False)
+    _credit: float = field(default=0.0, init=False, repr=False, compare=False)
 
     @property
     def goes_on(self) -> bool:
@@ -54,9 +58,19 @@ class RowDispute:
 
     def predict(self, motion: Motion) -> None:
         """Carry the refused on, as the filter does."""
+        self._credit *= float(np.exp(-abs(motion.speed or 0.0) * motion.seconds / _CREDIT_M))
         if self._rival is not None:
             self._rival.predict(motion)
             self._since += (motion.speed or 0.0) * motion.seconds
+
+    def trust(self) -> None:
+        """The filter has believed a picture."""
+        self._credit += 1.0
+
+    def reset(self) -> None:
+        """Another filter has the word."""
+        self._credit = 0.0
+        self.settle()
 
     def settle(self) -> None:
         """There is no dispute."""
@@ -101,10 +115,9 @@ class RowDispute:
         off = abs(float(rival.expected()[OFFSET] - row_filter.expected()[OFFSET]))
         if self._way < self.agreed or self._count < self.pictures or off > self.aside * spacing:
             return None
-        if 2 * self._refused < self._count:
-            self.settle()
+        if self._refused <= self._credit:
             return None
-        self.settle()
+        self.reset()
         rival.bend = row_filter.bend  # may have been set since
         return rival
 

@@ -137,7 +137,7 @@ class RowTracker:
     def reset(self) -> None:
         """Forget everything earlier pictures told."""
         self.row_filter.reset()
-        self.dispute.settle()
+        self.dispute.reset()
         self.extent.reset()
         self._way = self._unseen = self._reach = 0.0
         self._refused = 0
@@ -195,6 +195,8 @@ class RowTracker:
         doubt = _DISSENT if dissent else 1.0
         knew = self.row_filter.knows
         believed = self.row_filter.update(*_told(rows), doubt)
+        if believed and doubt == 1.0:
+            self.dispute.trust()
         if knew and (self.dispute.goes_on or not believed):
             # A start that is wrong holds the fit to wrong rows: by itself the picture may say something else
             better = self._disputed(look(True)[0], pieces, camera, believed)
