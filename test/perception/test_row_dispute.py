@@ -53,18 +53,52 @@ def test_a_filter_that_at_times_finds_what_it_looks_for_gives_way_too() -> None:
     assert taken_over_after(true, speed=1.6, pictures=40, held_every=1) is None
 
 
-def test_a_filter_that_has_believed_many_pictures_of_late_has_credit() -> None:
-    row_filter, dispute, step = RowFilter(), RowDispute(), Motion(0.1, 1.6, 0.0)
+@pytest.mark.parametrize(("speed", "least"), [(1.6, 1.5), (0.0, 1.0)])
+def test_a_filter_has_credit_for_the_pictures_it_has_believed_on_its_way(speed: float, least: float) -> None:
+    row_filter, dispute, before, step = (
+        RowFilter(),
+        RowDispute(),
+        Motion(0.1, speed, 0.0),
+        Motion(0.1, 1.6, 0.0),
+    )
     row_filter.update(WRONG, SIGMA)
     for _ in range(20):
+        dispute.predict(before)
         dispute.trust()
-    measured, ways = np.array([0.03, 0.0, 0.02]), []
+    ways = [0.0]
     for number in range(30):
         row_filter.predict(step)
         dispute.predict(step)
+        measured = np.array([0.03, 0.0, 0.02])
         if dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, False) is not None:
             ways.append(0.16 * number)
-    assert 1.5 < ways[0] < 4.0
+            break
+    assert least < ways[-1] < least + 2.0
+
+
+def test_a_dispute_is_over_once_the_picture_by_itself_agrees_with_the_filter() -> None:
+    row_filter, dispute, step = RowFilter(), RowDispute(), Motion(0.1, 1.6, 0.0)
+    row_filter.update(WRONG, SIGMA)
+    for measured, believed in ((WRONG + [0.1, 0.1, 0.0], False), (WRONG, True)):
+        row_filter.predict(step)
+        dispute.predict(step)
+        dispute.hear(row_filter, measured, SIGMA, 1.0, SPACING, believed)
+        assert dispute.goes_on != believed
+
+
+@pytest.mark.parametrize("motion", [Motion(0.1, 16.0, 0.0), Motion(0.1, -16.0, 0.0), Motion(0.1)])
+def test_a_stretch_that_no_picture_shows_and_a_way_that_nobody_knows_end_a_dispute(motion: Motion) -> None:
+    row_filter, dispute = RowFilter(), RowDispute()
+    row_filter.update(WRONG, SIGMA)
+    dispute.hear(row_filter, WRONG + [0.1, 0.1, 0.0], SIGMA, 1.0, SPACING, False)
+    assert dispute.goes_on
+    dispute.predict(motion)
+    assert not dispute.goes_on
+
+
+def test_backwards_it_is_decided_as_forwards() -> None:
+    true = np.array([-0.2, 0.0, 0.02])
+    assert taken_over_after(true, speed=-1.6, pictures=40) is not None
 
 
 def test_who_is_believed_where_the_refused_do_not_go_on_has_settled_the_dispute() -> None:

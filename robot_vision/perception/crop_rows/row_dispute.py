@@ -13,7 +13,9 @@ from robot_vision.perception.crop_rows.row_filter import OFFSET, Motion, RowFilt
 Array = NDArray[np.float64]
 
 _CREDIT_M = 3.0
-"""Way over which the credit of a filter fades."""
+"""Way over which the credit of a filter fades, and what it has refused is forgotten."""
+_PICTURE_M = 0.15
+"""Pictures nearer to each other than this show the same plants, and count for less than one."""
 _STEP_M = 0.5
 """Way from one picture that agrees to the next that counts at most."""
 
@@ -25,7 +27,7 @@ class RowDispute:
     A filter that began with a wrong picture is too sure of itself to take in right ones, and a search that begins where
     it says may find there what it looks for. What a few weeds in a gap look like changes with each step; rows stay
     where they are. A filter has credit, the number of pictures that it has believed of late: it keeps the word until it
-    has refused more that agree than that.
+    has refused more that agree than that. There is no dispute without odometry: nobody knows what should agree.
 
     Args:
         agreed: way over which they must, m: by then other plants are seen than at its beginning.
@@ -43,7 +45,8 @@ class RowDispute:
     _way: float = field(default=0.0, init=False, repr=False, compare=False)
     _since: float = field(default=0.0, init=False, repr=False, compare=False)
     _count: int = field(default=0, init=False, repr=False, compare=False)
-    _refused: int = field(default=0, init=False, repr=False, compare=False)
+    _refused: float = field(default=0.0, init=False, repr=False, compare=False)
+    _moved: float = field(default=0.0, init=False, repr=False, compare=False)
     _credit: float = field(default=0.0, init=False, repr=False, compare=False)
 
     @property
@@ -58,17 +61,22 @@ class RowDispute:
 
     def predict(self, motion: Motion) -> None:
         """Carry the refused on, as the filter does."""
-        self._credit *= float(np.exp(-abs(motion.speed or 0.0) * motion.seconds / _CREDIT_M))
+        self._moved = abs(motion.speed or 0.0) * max(motion.seconds, 0.0)
+        kept = float(np.exp(-self._moved / _CREDIT_M))
+        self._credit *= kept
+        self._refused *= kept
+        self._since += self._moved
+        if motion.speed is None or self._since > self.agreed:
+            self.settle()
         if self._rival is not None:
             self._rival.predict(motion)
-            self._since += (motion.speed or 0.0) * motion.seconds
 
     def trust(self) -> None:
-        """The filter has believed a picture."""
-        self._credit += 1.0
+        """The filter has believed a picture without a doubt."""
+        self._credit += self._weight
 
     def reset(self) -> None:
-        """Another filter has the word."""
+        """Another filter has the word, or none."""
         self._credit = 0.0
         self.settle()
 
@@ -96,6 +104,11 @@ class RowDispute:
             spacing: between rows, m.
             believed: whether the filter believes the picture, as it understands it.
         """
+        if row_filter.agrees(measured, covariance):
+            # by itself the picture says nothing against the filter
+            if believed:
+                self.settle()
+            return None
         rival = self._rival
         agrees = rival is not None and rival.update(measured, covariance, doubt)
         if not agrees and believed:
@@ -111,7 +124,7 @@ class RowDispute:
         self._way += min(self._since, _STEP_M)
         self._since = 0.0
         self._count += 1
-        self._refused += not believed
+        self._refused += 0.0 if believed else self._weight
         off = abs(float(rival.expected()[OFFSET] - row_filter.expected()[OFFSET]))
         if self._way < self.agreed or self._count < self.pictures or off > self.aside * spacing:
             return None
@@ -121,6 +134,11 @@ class RowDispute:
         rival.bend = row_filter.bend  # may have been set since
         return rival
 
+    @property
+    def _weight(self) -> float:
+        """Of a picture: pictures of a robot that stands show the same again and again."""
+        return min(self._moved / _PICTURE_M, 1.0)
+
     def _restart(self) -> None:
-        self._way, self._since = 0.0, 0.0
-        self._count = self._refused = 0
+        self._way = self._since = self._refused = 0.0
+        self._count = 0

@@ -141,16 +141,20 @@ class RowFilter:
             return True
         # New plants bring a new common error, as large as this picture's
         f.P[_COMMON, _COMMON] += self._common_gain * self.shared * covariance
-        see = _SEEN
-        expected = see @ f.P @ see.T + (1.0 - self.shared) * covariance
-        surprise = measured - (see @ f.x)[:, 0]
-        if float(surprise @ np.linalg.solve(expected, surprise)) > self.gate:
+        if not self.agrees(measured, covariance):
             return False
         f.R = (doubt - self.shared) * covariance
-        f.H = see
+        f.H = _SEEN
         f.update(measured[:, None])
         f.P = 0.5 * (f.P + f.P.T)
         return True
+
+    def agrees(self, measured: Array, covariance: Array) -> bool:
+        """Whether what a picture says, (3,) and (3, 3) as of `update`, lies within the gate."""
+        assert self._filter is not None
+        expected = _SEEN @ self._filter.P @ _SEEN.T + (1.0 - self.shared) * covariance
+        surprise = measured - (_SEEN @ self._filter.x)[:, 0]
+        return float(surprise @ np.linalg.solve(expected, surprise)) <= self.gate
 
     def expected(self) -> Array:
         """What a picture would say: offset, yaw as the camera sees it, curvature: (3,)."""

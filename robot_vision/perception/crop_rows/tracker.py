@@ -197,7 +197,7 @@ class RowTracker:
         believed = self.row_filter.update(*_told(rows), doubt)
         if believed and doubt == 1.0:
             self.dispute.trust()
-        if knew and (self.dispute.goes_on or not believed):
+        if knew and not self._blind and (self.dispute.goes_on or not believed):
             # A start that is wrong holds the fit to wrong rows: by itself the picture may say something else
             better = self._disputed(look(True)[0], pieces, camera, believed)
             if better is not None:
@@ -290,7 +290,8 @@ class RowTracker:
     ) -> tuple[RowsOnGround | None, str]:
         """Rows of this picture alone, fitted to pieces of plants or of the ground between, or why there are none.
 
-        The plants tell besides where open ground is. Anew: the search starts without what is known.
+        The plants tell besides where open ground is. Anew: the search starts without what is known of the rows; what
+        grows on ground that is known to be open is left out all the same.
         """
         if covered < self.cover:
             return None, "hardly anything grows in this picture"
