@@ -197,7 +197,10 @@ def test_what_is_called_free_is_free_before_between_and_after_the_failures(answe
         counts = [answers.wrongly_free(stamp) for stamp in answers.stamps[part] if stamp in answers.plans]
         free, wrong = np.sum(counts, axis=0)
         assert free > 300 * len(counts)
-        assert wrong < 0.01 * free
+        # In the one picture where a wall's foot is not seen in a few columns slivers of free floor go through it: which
+        # picture that is, if any, depends on the last digits of the machine's arithmetic
+        assert wrong < 0.02 * free
+        assert np.median([wrong / free for free, wrong in counts]) < 0.002
     assert answers.of("nothing", answers.maps)
 
 
