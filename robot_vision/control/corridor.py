@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_vision.control.limits import CommandClock, Steering, approach, speed_to_stop_within
+from robot_vision.control.limits import CommandClock, Steering, approach, speed_to_stop_within, way_to_stop
 from robot_vision.perception import LaneHeading
 from robot_vision.perception.attitude import Lean
 
@@ -76,7 +76,7 @@ class CorridorSteering:
     @property
     def braking_way(self) -> float:
         """Way before an obstacle at which to hear of it, m: from full speed, within the limit of braking."""
-        return self.stop_distance + 0.5 * self.speed**2 / self.most_acceleration
+        return self.stop_distance + way_to_stop(self.speed, self.most_acceleration)
 
     def reset(self) -> None:
         """Stand still, as after a stop from outside or a clock that jumped."""

@@ -33,6 +33,11 @@ def speed_to_stop_within(distance: float, deceleration: float) -> float:
     return float(np.sqrt(2.0 * deceleration * max(0.0, distance)))
 
 
+def way_to_stop(speed: float, deceleration: float) -> float:
+    """Distance (m) within which a vehicle comes to rest from a speed (m/s), braking evenly (m/s^2)."""
+    return 0.5 * speed**2 / deceleration
+
+
 @dataclass
 class CommandClock:
     """Time between commands, by which they may differ.

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -109,25 +108,3 @@ def test_small_plants_are_cut_at_their_waist_where_the_crop_closes(closes: bool,
     blobs = PlantSegmenter().cut(window, camera, Lean(), 0.12, none, none)
     left = blobs.slopes[:, 1] * window.fall
     assert (left > corner[1] + side * 160).sum() == expected
-
-
-def test_a_known_weed_hides_no_plant_of_the_crop_beside_it() -> None:
-    radius, rows = 25, 30 + 40 * np.arange(5)
-    grown = np.zeros((220, 300), np.uint8)
-    for row in rows.tolist():
-        cv2.circle(grown, (60, row), radius, 1, -1)
-    grown[:, 130:] = 1  # the crop closes
-    cv2.circle(grown, (93, 110), 5, 1, -1)
-    seen = np.ones(grown.shape, np.bool_)
-    window = GroundWindow(grown, seen, np.zeros_like(seen), np.array([0.7, -0.9]), 0.006, 1.2)
-    camera = Camera(460.0, 460.0, 319.5, 239.5, 640, 480, height_m=1.4)
-
-    def nearest(known: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of the blob nearest to each plant, cells."""
-        blobs = PlantSegmenter().cut(window, camera, Lean(), radius * 0.006, known, known)
-        places = (blobs.slopes * window.fall - window.corner) / 0.006
-        plants = np.column_stack([rows, np.full(5, 60)])
-        return np.asarray(np.linalg.norm(places[:, None] - plants[None], axis=2).min(axis=0))
-
-    unknown, known = nearest(np.zeros((0, 2))), nearest(window.corner + 0.006 * np.array([[110.0, 93.0]]))
-    assert known == pytest.approx(unknown, abs=1.0)

@@ -110,16 +110,12 @@ class RowDispute:
                 self.settle()
             return None
         rival = self._rival
-        agrees = rival is not None and rival.update(measured, covariance, doubt)
-        if not agrees and believed:
+        if rival is None or not rival.update(measured, covariance, doubt):
             self.settle()
+            if not believed:
+                rival = replace(row_filter)
+                self._rival = rival if rival.update(measured, covariance, doubt) else None
             return None
-        if not agrees:
-            rival = replace(row_filter)
-            self._rival = rival if rival.update(measured, covariance, doubt) else None
-            self._restart()
-            return None
-        assert rival is not None
         # Way without a picture that agrees, as across a gap, is none over which they have agreed
         self._way += min(self._since, _STEP_M)
         self._since = 0.0

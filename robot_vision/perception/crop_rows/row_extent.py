@@ -75,10 +75,8 @@ class RowExtent:
 
     def reset(self) -> None:
         """Forget the way so far."""
-        self._cover = np.zeros(_CELLS)
-        self._seen = np.zeros(_CELLS)
-        self._near_cover = np.zeros(_CELLS)
-        self._near_seen = np.zeros(_CELLS)
+        self._sums = np.zeros((4, _CELLS))
+        self._cover, self._seen, self._near_cover, self._near_seen = self._sums
         self._origin = -_BEHIND
 
     def see(self, way: float, ahead: Array, cover: Array, seen: Array) -> None:
@@ -92,19 +90,13 @@ class RowExtent:
         """
         gone = min(int(np.floor(way / CELL_M)) - _BEHIND - self._origin, _CELLS)
         if gone > 0:
-            for kept in (self._cover, self._seen, self._near_cover, self._near_seen):
-                kept[: _CELLS - gone] = kept[gone:]
-                kept[_CELLS - gone :] = 0.0
+            self._sums[:, : _CELLS - gone] = self._sums[:, gone:]
+            self._sums[:, _CELLS - gone :] = 0.0
             self._origin += gone
         place = np.floor((way + ahead) / CELL_M).astype(np.int64) - self._origin
         good = (place >= 0) & (place < _CELLS)
         nearly = seen * _NEARBY_M / np.maximum(ahead, _NEARBY_M)
-        for total, part in (
-            (self._cover, seen * cover),
-            (self._seen, seen),
-            (self._near_cover, nearly * cover),
-            (self._near_seen, nearly),
-        ):
+        for total, part in zip(self._sums, (seen * cover, seen, nearly * cover, nearly), strict=True):
             np.add.at(total, place[good], part[good])
 
     def is_open(self, way: float, ahead: Array) -> NDArray[np.bool_]:

@@ -190,9 +190,7 @@ class RowTracker:
         rows, fault = look(not self.row_filter.knows)
         if rows is None:
             return self._refuse(pieces, camera, motion, fault)
-        rows = nearest_row(rows, self._expected_offset())
-        dissent = self._dissent(pieces, rows, camera)
-        doubt = _DISSENT if dissent else 1.0
+        rows, dissent, doubt = self._weighed(rows, pieces, camera)
         knew = self.row_filter.knows
         believed = self.row_filter.update(*_told(rows), doubt)
         if believed and doubt == 1.0:
@@ -223,9 +221,7 @@ class RowTracker:
         """Rows of a picture by itself, what speaks against them, and the doubt, where the filter gives way to them."""
         if rows is None:
             return None
-        rows = nearest_row(rows, self._expected_offset())
-        dissent = self._dissent(pieces, rows, camera)
-        doubt = _DISSENT if dissent else 1.0
+        rows, dissent, doubt = self._weighed(rows, pieces, camera)
         better = self.dispute.hear(self.row_filter, *_told(rows), doubt, self.spacing, believed)
         if better is None:
             return None
@@ -233,8 +229,12 @@ class RowTracker:
         self.extent.reset()  # what was noted along the way was noted at the wrong place
         return rows, dissent, doubt
 
-    def _expected_offset(self) -> float:
-        return float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
+    def _weighed(self, rows: RowsOnGround, pieces: Pieces, camera: Camera) -> tuple[RowsOnGround, str, float]:
+        """Rows counted from the robot's own, what speaks against them, and the factor of doubt on their covariance."""
+        expected = float(self.row_filter.expected()[OFFSET]) if self.row_filter.knows else 0.0
+        rows = nearest_row(rows, expected)
+        dissent = self._dissent(pieces, rows, camera)
+        return rows, dissent, _DISSENT if dissent else 1.0
 
     def _dissent(self, pieces: Pieces, rows: RowsOnGround, camera: Camera) -> str:
         """What single plants (20.11)-(20.15) have against the rows fitted to all of them; empty when nothing."""
